@@ -1,0 +1,21 @@
+// How large an explicit step may be: the largest eigenvalue of M^-1 K by Lanczos, with its residual as an upper bound.
+#pragma once
+
+#include "analysis/affine_map.h"
+#include "analysis/shell/shell_model.h"
+
+namespace toile {
+
+struct TimeStepBound {
+  double dt = 0;                 // s: 2 / sqrt(eigenvalue bound), without safety factor
+  double eigenvalue = 0;         // 1/s2, upper bound
+  double relative_gap = 0;       // bound over Ritz value, minus 1
+  ShellModel::Cell cell;         // the cell that limits it
+  bool bending = false;          // whether bending rather than membrane stiffness dominates there
+};
+
+// Of the undamped, unprojected model at q. Cost: some 40 applications of the tangent. Deterministic.
+TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
+                              const Eigen::VectorXd& q);
+
+}  // namespace toile

@@ -1,0 +1,59 @@
+// Velocity Verlet with projection, one step at a time. [Peng & Zheng 2022, eqs. 18-19, 24-34; Bridson et al. 2003]
+#pragma once
+
+#include <Eigen/Core>
+
+#include "analysis/affine_map.h"
+#include "analysis/projection/fast_projection.h"
+#include "analysis/shell/shell_model.h"
+
+namespace toile {
+
+// Free nodes: places, velocities, accelerations at one time. Restartable bit by bit.
+struct DynamicState {
+  double t = 0;
+  Eigen::VectorXd x, v, a;
+};
+
+// Dead loads on control points [N], 3 n: gravity on the true mass and tractions; wind [m/s] acts through drag.
+struct Loads {
+  Eigen::VectorXd force;
+  Eigen::Vector3d wind = Eigen::Vector3d::Zero();
+};
+
+struct StepReport {
+  double dt = 0;
+  ProjectionReport projection;
+  ShellEnergy elastic;           // at the end
+  double kinetic = 0;            // J, at the end
+  double load_work = 0;          // J, work of dead loads in the step
+  double drag_work = 0;          // J, work of drag (negative: dissipated)
+  double motion_work = 0;        // J, work of moved pins
+  bool finite = true;
+};
+
+// Everything a step needs that doesn't change from step to step. The caller keeps the parts alive.
+struct DynamicSystem {
+  const ShellModel* model = nullptr;
+  const AffineMap* map = nullptr;
+  Eigen::VectorXd node_mass, node_drag;    // reduced lumped mass with floor [kg], drag [kg/s]
+  Loads loads;
+  FastProjection* projection = nullptr;    // null: no limits and no place rows
+};
+
+// Accelerations (and nothing else) from places and velocities: for the start and after a change of the system.
+void initialise(const DynamicSystem& system, DynamicState& state);
+
+// Advances state by dt. The velocity between the steps is (x_n+1 - x_n) / dt after projection; drag is implicit.
+// A step that ends in non-finite numbers leaves `state` as it was and says so.
+StepReport step(const DynamicSystem& system, DynamicState& state, double dt);
+
+// Force that each fixed control point and each place row exerts on the cloth [N] at the state's time, dt being the last
+// step's.
+struct Reactions {
+  Eigen::Matrix3Xd fixed;   // AffineMap::fixed order
+  Eigen::Matrix3Xd place;   // place rows
+};
+Reactions reactions(const DynamicSystem& system, const DynamicState& state, double dt);
+
+}  // namespace toile

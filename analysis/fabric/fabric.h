@@ -1,0 +1,39 @@
+// What a cloth is made of: one table of numbers, and the two laws of the paper as functions of strain and curvature.
+#pragma once
+
+#include <cmath>
+
+namespace toile {
+
+enum class RestCurvature { zero, panel };
+
+// Defaults: the cloth of example 4.1(a). [Peng & Zheng 2022, 4.1]
+struct Fabric {
+  double density = 0.117;       // kg/m2, of the rest area
+  double thickness = 0.001177;  // m
+  struct Membrane {             // S = k E, eq. (8), as resultants
+    double weft = 11.7;         // N/m
+    double warp = 11.7;         // N/m
+    double shear = 4.68;        // N/m, on 2 E12
+  } membrane;
+  struct Bending {              // eq. (9), regularised
+    double b0 = 3.3e-3;         // N m (moment per length over curvature)
+    double kappa0 = 30;         // 1/m, where the square-root branch ends
+    double kappa_reg = 0.03;    // 1/m, below which the moment becomes linear; makes the slope at 0 finite
+    double twist = 0;           // N m, stiffness against the twist curvature; the paper's law has none
+  } bending;
+  double drag = 0.351;          // kg/(m2 s), force per area against the velocity relative to the wind
+  double friction = 0.3;        // read and kept for scenes with contact
+  RestCurvature rest_curvature = RestCurvature::panel;
+};
+
+// Energy per area, moment per length and slope of eq. (9), regularised: the square-root branch uses
+// (kappa^2 + kappa_reg^2)^(1/4), the linear branch continues it with the same energy and moment at kappa0.
+struct BendingResponse {
+  double energy = 0;  // N/m
+  double moment = 0;  // N
+  double slope = 0;   // N m
+};
+BendingResponse bending_response(const Fabric::Bending& law, double kappa);
+
+}  // namespace toile

@@ -1,0 +1,34 @@
+// Sparse symmetric positive definite systems with a fixed pattern, by CHOLMOD: analysed once, refactored at will.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace toile {
+
+// Lower triangle in compressed columns: column_start n+1, row indices ascending within a column, diagonal present.
+struct SparsePattern {
+  std::vector<int> column_start, row;
+  int size() const { return static_cast<int>(column_start.size()) - 1; }
+};
+
+class Cholesky {
+ public:
+  explicit Cholesky(SparsePattern pattern);
+  ~Cholesky();
+  Cholesky(Cholesky&&) noexcept;
+  Cholesky& operator=(Cholesky&&) noexcept;
+
+  // Values in the order of the pattern. False where a pivot is not positive; the factor is then unusable.
+  bool factorise(std::span<const double> values);
+  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) const;
+  std::size_t factor_nonzeros() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace toile

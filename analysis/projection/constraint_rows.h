@@ -1,0 +1,38 @@
+// Constraints as sparse scalar rows on control points: everything fast projection needs to know about a scene.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/shell/shell_model.h"
+#include "trimming/constraint_points.h"
+
+namespace toile {
+
+// A row d over control points gives the vector y = sum_I d_I q_I.
+//   strain rows: d = N_,weft or N_,warp at a constraint point; C = (y.y - 1) / 2                 [eq. 36]
+//   place rows:  d = N at a pinned material point; C = y - target(t), three components, always an equality.
+struct ScalarRow {
+  std::vector<int> index;      // control points, ascending
+  std::vector<double> value;
+};
+struct StrainRow {
+  ScalarRow row;
+  int panel = 0;
+  int point = 0;               // in the panel's constraint points
+  bool warp = false;
+};
+struct PlaceRow {
+  ScalarRow row;
+  int pin = 0;                                       // of the scene, for reactions and messages
+  std::function<Eigen::Vector3d(double)> target;     // place at time t [m]
+};
+
+struct ConstraintRows {
+  std::vector<StrainRow> strain;
+  std::vector<PlaceRow> place;
+};
+
+}  // namespace toile

@@ -1,0 +1,55 @@
+// Continuum fast projection: moves a candidate state onto the constraints with the least change of kinetic energy.
+// [Peng & Zheng 2022, eqs. 29-36; Goldenthal et al. 2007]
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "analysis/affine_map.h"
+#include "analysis/projection/constraint_rows.h"
+
+namespace toile {
+
+struct ProjectionOptions {
+  double tolerance = 0.01;        // largest |C| of a strain row that counts as met
+  double place_tolerance = 1e-9;  // m, of place rows
+  double regularisation = 1e-4;   // added to the unit diagonal of the scaled strain rows
+  int min_iterations = 1;         // projecting at least once a step is smooth in dt
+  int max_iterations = 50;
+};
+
+struct ProjectionReport {
+  bool converged = false;         // <=> strain_violation <= tolerance and place_violation <= place_tolerance
+  int iterations = 0;
+  double strain_violation = 0;    // largest |C| at the end
+  double place_violation = 0;     // m
+  int worst_row = -1;             // strain row with the largest |C|
+};
+
+//   (1) fixed control points don't move; (2) linear and angular momentum are kept where nothing is pinned;
+//   (3) pattern analysed once, in the constructor.
+class FastProjection {
+ public:
+  FastProjection(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
+                 const ProjectionOptions& options = {});
+  ~FastProjection();
+  FastProjection(FastProjection&&) noexcept;
+  FastProjection& operator=(FastProjection&&) noexcept;
+
+  // Corrects x (free nodes) at time t. `impulse` in control points' dual space is left in `node_impulse()`:
+  // M (x_after - x_before) = -sum J^T lambda.
+  ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t);
+
+  // Sum over the last projection's iterations of the multipliers, per row [kg m2 for strain rows, kg m for place rows]:
+  // divided by dt^2 they are the constraint forces' quadrature weights [N m, N].
+  const Eigen::VectorXd& strain_multipliers() const;
+  const Eigen::Matrix3Xd& place_multipliers() const;
+  const ConstraintRows& rows() const;
+  std::size_t factor_nonzeros() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace toile

@@ -1,0 +1,85 @@
+// Isogeometric Kirchhoff-Love cloth: energy, force and tangent of the panels of a scene. [Peng & Zheng 2022, eqs. 1-17]
+//
+// Degrees of freedom: q = positions of all control points [m], panel by panel, u fastest, xyz interleaved (3 n numbers).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/fabric/fabric.h"
+#include "geometry/nurbs_surface.h"
+#include "trimming/quadrature.h"
+
+namespace toile {
+
+// One panel, SI, in the scene's axes. `rest` is unstrained; its directions weft (turned by grain from the u direction
+// within the tangent plane, counter-clockwise seen against the normal) and warp carry eqs. (8) and (9).
+struct ShellPanel {
+  std::string name;
+  NurbsSurface rest;
+  CutQuadrature quadrature;
+  Fabric fabric;
+  double grain = 0;  // rad
+};
+
+struct ShellEnergy {
+  double membrane = 0, bending = 0;  // J
+  double total() const { return membrane + bending; }
+};
+
+// Surface functions at a material point in the fabric's own rest coordinates (weft = 1, warp = 2): row r of the arrays
+// holds N, N_,1, N_,2, N_,11, N_,22, N_,12 for control points `index` (global numbers). [eqs. 5-7]
+struct MaterialPoint {
+  std::vector<int> index;
+  std::array<std::vector<double>, 6> value;
+};
+
+// Strains, curvatures and stress resultants at a material point, in weft / warp / shear.
+struct ShellState {
+  Eigen::Vector3d position;
+  Eigen::Vector3d strain;       // E11, E22, 2 E12
+  Eigen::Vector3d curvature;    // kappa11, kappa22, kappa12, change from rest
+  Eigen::Vector3d second_pk;    // S11, S22, S12 [N/m]
+  Eigen::Vector2d nominal;      // lambda S in weft and warp [N/m]
+};
+
+//   (1) force = -dE/dq; (2) rigid motion of q leaves the energy; (3) results don't depend on the number of threads;
+//   (4) bending is not assembled where b0 = 0, membrane not where all k = 0.
+class ShellModel {
+ public:
+  explicit ShellModel(std::vector<ShellPanel> panels);
+  ~ShellModel();
+  ShellModel(ShellModel&&) noexcept;
+  ShellModel& operator=(ShellModel&&) noexcept;
+
+  int control_point_count() const;
+  const std::vector<ShellPanel>& panels() const;
+  int first_control_point(int panel) const;
+  const Eigen::VectorXd& rest() const;          // 3 n
+  const Eigen::VectorXd& lumped_mass() const;   // n, row sums [kg]; 0 where a control point carries no cloth
+  const Eigen::VectorXd& lumped_drag() const;   // n, row sums of eta [kg/s]
+
+  // Overwrites `force` with the internal force [N] at q. Allocates nothing.
+  ShellEnergy internal_force(const Eigen::Ref<const Eigen::VectorXd>& q, Eigen::Ref<Eigen::VectorXd> force) const;
+
+  // Action of the tangent stiffness at q: df = K(q) dq, material and positive geometric parts, so that K is an upper
+  // estimate of the true tangent (what a step size bound wants). Allocates nothing.
+  void apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
+                     Eigen::Ref<Eigen::VectorXd> df) const;
+
+  // The cell whose share of dq . K(q) dq per mass is largest: (panel, i, j).
+  struct Cell { int panel = 0, i = 0, j = 0; };
+  Cell stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq) const;
+
+  MaterialPoint material_point(int panel, double u, double v) const;
+  ShellState state(int panel, double u, double v, const Eigen::Ref<const Eigen::VectorXd>& q) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace toile

@@ -1,0 +1,1 @@
+#include "geometry/knot_vector.h"

@@ -1,0 +1,48 @@
+// A surface and the loops of parameter curves that bound its material: what one IGES face is, as data.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/nurbs_curve.h"
+#include "geometry/nurbs_surface.h"
+
+namespace toile {
+
+// One segment of a loop. `curve` runs in the file's own direction with the file's own numbers; the loop traverses it
+// backwards when `reversed`. `index` is its number in the file's loop (the K of `curve:LOOP,K`), which reordering,
+// reversal and repair don't change.
+struct TrimCurve {
+  Curve2 curve;
+  int index = 0;
+  bool reversed = false;
+  std::optional<Curve3> model;  // the file's model-space curve, unit of the net
+};
+
+enum class LoopKind { outer, hole };
+
+// A closed chain of parameter curves in traversal order. `index` is the loop's number in the file.
+// After validate_loops (trimming/loops.h): closed within `gap`, simple, outer counter-clockwise, holes clockwise.
+struct TrimLoop {
+  LoopKind kind = LoopKind::outer;
+  int index = 0;
+  std::vector<TrimCurve> curves;
+  double gap = 0;  // largest distance in the parameter plane between the end of one curve and the start of the next
+};
+
+// A face. Numbers are the file's own; one exact factor gives metres.
+struct TrimmedSurface {
+  std::string name;
+  NurbsSurface surface;
+  std::vector<TrimLoop> loops;   // never empty after reading: a face without a trim has its natural loop
+  bool natural_bounds = false;   // the loop is the border of the domain, made by natural_loop()
+  double metres_per_unit = 1;
+  double resolution = 0;         // smallest length that the file means (IGES global field 19), unit of the net
+  std::string source;            // where it came from, for messages: "skirt.igs:412: entity 144"
+};
+
+// Border of the domain as one loop of four lines: curves 0 to 3 from v = min, counter-clockwise.
+TrimLoop natural_loop(const NurbsSurface& surface);
+
+}  // namespace toile

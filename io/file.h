@@ -1,0 +1,18 @@
+// Whole files in and out.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace toile {
+
+// Throws InputError naming the file and the system's reason; refuses directories and files above `limit` bytes.
+std::string read_file(const std::filesystem::path& path, std::uintmax_t limit = std::uintmax_t{4} << 30);
+
+// The file appears whole or not at all: written beside its place, flushed, renamed. Makes missing parent folders.
+// Throws OutputError.
+void write_file(const std::filesystem::path& path, std::string_view bytes);
+
+}  // namespace toile

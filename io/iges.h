@@ -1,0 +1,80 @@
+// IGES 5.3: reading panels from any exporter's file, writing files that every system reads. (shared design: iges.md)
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "geometry/trimmed_surface.h"
+
+namespace toile {
+
+namespace iges { struct File; }  // sections, directory entries and parameter records as read (io/iges/file.h)
+
+enum class Disposition { read, converted, kept, quarantined };
+
+// What happened to an entity of the file.
+struct LedgerEntry {
+  int sequence = 0;       // number of its directory entry (odd, as the file counts)
+  int line = 0;           // line of the file where the directory entry stands
+  int type = 0, form = 0;
+  Disposition disposition = Disposition::kept;
+  std::string why;        // for converted and quarantined
+};
+
+struct PanelFile {
+  std::string path;
+  std::string unit;                 // "MM", "INCH", ... as the file names it
+  double metres_per_unit = 1;
+  double resolution = 0;            // global field 19, unit of the file
+  std::string exporter;             // global fields 3 and 5 to 6
+  std::map<int, int> entities;      // type -> count
+  std::vector<TrimmedSurface> panels;  // every face (144) and every free-standing 128, in file order
+  std::vector<LedgerEntry> ledger;
+  std::vector<std::string> warnings;   // one per kind of oddity, with line and entity
+  std::shared_ptr<const iges::File> file;  // the records, for replay
+};
+
+// Throws InputError with file, line, entity and what was expected.
+PanelFile read_iges(const std::filesystem::path& path);
+PanelFile parse_iges(std::string_view text, const std::string& name);
+
+// How records that the model knows are written: the bytes of the source, or made anew from the model.
+enum class IgesMode { replay, rewrite };
+std::string format_iges(const PanelFile& file, IgesMode mode = IgesMode::replay);
+
+// A face for a new file: net and trims in `face`'s unit; faces of one file share it.
+struct OutputFace {
+  TrimmedSurface face;
+  std::string name;                                   // 406 form 15
+  int level = 0;
+  std::optional<std::array<double, 3>> colour;        // rgb, 0..1 (314)
+};
+struct IgesHeader {
+  std::string product = "toile";
+  std::string unit = "MM";             // IGES unit name that agrees with the faces' metres_per_unit
+  double resolution = 1e-6;            // unit of the file; raised to the fit error of the model curves where that is larger
+  std::optional<std::string> date;     // YYYYMMDD.HHNNSS; unset: SOURCE_DATE_EPOCH, else 19700101.000000
+};
+struct IgesOutput {
+  std::string text;
+  double largest_curve_fit = 0;  // largest |C3(t) - S(c(t))| over all model curves, unit of the file
+};
+IgesOutput format_iges(std::span<const OutputFace> faces, const IgesHeader& header);
+
+// Read, write, read: what `toile roundtrip` reports.
+struct RoundtripReport {
+  int faces = 0, faces_lost = 0, entities = 0, entities_lost = 0;
+  bool knots_equal = true, weights_equal = true, points_equal = true, parameter_curves_equal = true;
+  std::vector<std::string> differences;  // first of each kind, with panel and entity
+  bool exact() const;
+};
+RoundtripReport roundtrip(const PanelFile& original, IgesMode mode);
+
+}  // namespace toile

@@ -1,0 +1,8 @@
+#pragma once
+
+namespace toile {
+
+// "0.1.0", as in CMakeLists.txt.
+const char* version();
+
+}  // namespace toile

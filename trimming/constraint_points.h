@@ -1,0 +1,24 @@
+// The points at which strain is limited: knot-mesh vertices in the material and the meetings of trims with knot lines
+// [Peng & Zheng 2022, 3.4, Fig. 3]. The contract is in design.md, "The command line".
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "trimming/topology.h"
+
+namespace toile {
+
+struct ConstraintPoint {
+  PointKind kind = PointKind::vertex;
+  double u = 0, v = 0;           // knot coordinates bitwise
+  int loop = -1, curve = -1;     // the file's numbers; -1 for an inner vertex
+  double t = 0;                  // on the file's curve
+  bool used = true;              // false: the projection leaves it out, `why` says the reason
+  std::string why;
+};
+
+// All of them, inner vertices first (u fastest), then events in the order of the loops; none twice.
+std::vector<ConstraintPoint> constraint_points(const TrimmedSurface& surface, const TrimTopology& topology);
+
+}  // namespace toile

@@ -1,0 +1,1 @@
+#include "trimming/topology.h"
