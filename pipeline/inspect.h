@@ -1,0 +1,52 @@
+// What is in a panel file: entities, loops, cells, constraint points; for reading, for programs and as a drawing.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/refine.h"
+#include "io/iges.h"
+#include "trimming/constraint_points.h"
+#include "trimming/loops.h"
+#include "trimming/quadrature.h"
+#include "trimming/topology.h"
+
+namespace toile {
+
+// Unset: the file's own knots. (design.md, "Refinement")
+struct InspectOptions {
+  std::optional<int> degree;
+  std::optional<double> span;   // m, largest span length
+  std::optional<int> spans;     // per direction
+  bool select_rows = true;      // say which points the projection takes, for the default fabric and no pins
+};
+
+struct InspectedPanel {
+  TrimmedSurface face;                  // refined as asked, loops valid
+  TrimTopology topology;
+  std::vector<ConstraintPoint> points;
+  PanelMeasure measure;                 // unit of the net
+  int active_control_points = 0;        // their support meets the material
+  std::vector<double> gaps;             // per loop as read, before repair; largest, parameter plane
+  std::vector<LoopRepair> repairs;
+  std::vector<std::string> warnings;
+};
+
+struct Inspection {
+  std::string file, unit, exporter;
+  std::map<int, int> entities;
+  std::vector<LedgerEntry> ledger;      // what was converted or quarantined
+  std::vector<std::string> warnings;    // of the file, then of the panels
+  std::vector<InspectedPanel> panels;
+};
+
+// Throws GeometryError where a panel has no valid trim, with panel, loop and place.
+Inspection inspect(const PanelFile& file, const InspectOptions& options = {});
+
+std::string inspect_text(const Inspection& inspection);
+nlohmann::ordered_json inspect_json(const Inspection& inspection);  // the contract of design.md
+std::string inspect_svg(const Inspection& inspection);
+
+}  // namespace toile
