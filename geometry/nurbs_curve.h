@@ -28,7 +28,7 @@ class NurbsCurve {
   const std::vector<double>& weights() const { return weights_; }
   double weight(int i) const { return weights_.empty() ? 1.0 : weights_[static_cast<std::size_t>(i)]; }
   // False also where all weights are equal: the curve is polynomial.
-  bool rational() const;
+  bool rational() const { return rational_; }
 
   Point operator()(double t) const;
   Point start() const { return (*this)(domain().min); }
@@ -40,6 +40,7 @@ class NurbsCurve {
   KnotVector knots_;
   Points points_;
   std::vector<double> weights_;
+  bool rational_ = false;
 };
 
 using Curve2 = NurbsCurve<2>;

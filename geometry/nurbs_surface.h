@@ -30,7 +30,7 @@ class NurbsSurface {
   const std::vector<double>& weights() const { return weights_; }
   double weight(int k) const { return weights_.empty() ? 1.0 : weights_[static_cast<std::size_t>(k)]; }
   // False also where all weights are equal: the surface is polynomial.
-  bool rational() const;
+  bool rational() const { return rational_; }
 
   Eigen::Vector3d operator()(double u, double v) const;
 
@@ -43,6 +43,7 @@ class NurbsSurface {
   std::array<KnotVector, 2> knots_;
   Eigen::Matrix3Xd points_ = Eigen::Matrix3Xd::Zero(3, 4);
   std::vector<double> weights_;
+  bool rational_ = false;
 };
 
 // Position and partial derivatives at a parameter.
