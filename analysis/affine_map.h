@@ -17,8 +17,8 @@ class AffineMap {
 
   // `dependence`: n_q x n_q; row i says how control point i follows the others: identity rows are independent; the rows
   // of extended functions and of control points that carry no cloth hold extension coefficients and refer to independent
-  // control points only. `fixed`: control points held or moved; motion(i, t) is the place of the i-th of them [m].
-  // A fixed control point's own dependence row is ignored.
+  // control points only. `fixed`: control points held or moved, none twice; motion(i, t) is the place of the i-th of
+  // them [m]. A fixed control point's own dependence row is ignored. Throws SolverError where this doesn't hold.
   using Motion = std::function<Eigen::Vector3d(std::size_t, double)>;
   AffineMap(const Matrix& dependence, std::vector<int> fixed, Motion motion);
 
@@ -26,9 +26,11 @@ class AffineMap {
 
   int control_points() const { return static_cast<int>(free_.rows()); }
   int nodes() const { return static_cast<int>(free_.cols()); }
-  const Matrix& free_part() const { return free_; }            // T: n_q x n_x
+  const Matrix& free_part() const { return free_; }         // T: n_q x n_x
+  const Matrix& fixed_part() const { return fixed_part_; }  // G: n_q x n_fixed, g(t) = G (places of the fixed ones)
   const std::vector<int>& fixed() const { return fixed_; }
   const std::vector<int>& node_control_point() const { return node_control_point_; }  // control point that node k is
+  Eigen::Matrix3Xd fixed_places(double t) const;
 
   void expand(const Eigen::Ref<const Eigen::VectorXd>& x, double t, Eigen::Ref<Eigen::VectorXd> q) const;
   // T^T f for forces and other dual quantities (3 n_q -> 3 n_x), and for nodal scalars such as masses (n_q -> n_x).
