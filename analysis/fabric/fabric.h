@@ -1,8 +1,6 @@
 // What a cloth is made of: one table of numbers, and the two laws of the paper as functions of strain and curvature.
 #pragma once
 
-#include <cmath>
-
 namespace toile {
 
 enum class RestCurvature { zero, panel };
@@ -18,9 +16,10 @@ struct Fabric {
   } membrane;
   struct Bending {              // eq. (9), regularised
     double b0 = 3.3e-3;         // N m (moment per length over curvature)
-    double kappa0 = 30;         // 1/m, where the square-root branch ends
+    double kappa0 = 30;         // 1/m, where the square-root branch ends; 0 makes the law linear, m = b0 kappa
     double kappa_reg = 0.03;    // 1/m, below which the moment becomes linear; makes the slope at 0 finite
-    double twist = 0;           // N m, stiffness against the twist curvature; the paper's law has none
+    double twist = 0;           // N m, energy twist * kappa12^2 per area; the paper's law has none. A linear law with
+                                // twist = b0 is the isotropic plate without lateral contraction
   } bending;
   double drag = 0.351;          // kg/(m2 s), force per area against the velocity relative to the wind
   double friction = 0.3;        // read and kept for scenes with contact
@@ -29,11 +28,18 @@ struct Fabric {
 
 // Energy per area, moment per length and slope of eq. (9), regularised: the square-root branch uses
 // (kappa^2 + kappa_reg^2)^(1/4), the linear branch continues it with the same energy and moment at kappa0.
+//   (1) moment = d energy / d kappa, odd in kappa; (2) slope = d moment / d kappa, positive, largest at 0 as long as
+//   kappa_reg < 4 kappa0, where it is 2 b0 sqrt(kappa0 / kappa_reg); (3) energy and moment are continuous, the slope
+//   jumps to b0 at kappa0 (which itself counts to the linear branch).
 struct BendingResponse {
   double energy = 0;  // N/m
   double moment = 0;  // N
   double slope = 0;   // N m
 };
 BendingResponse bending_response(const Fabric::Bending& law, double kappa);
+
+// Throws Error naming the entry of the table that is negative, not finite, or (kappa_reg where there is bending, density)
+// not positive.
+void validate(const Fabric& fabric);
 
 }  // namespace toile

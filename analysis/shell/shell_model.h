@@ -30,6 +30,11 @@ struct ShellEnergy {
   double total() const { return membrane + bending; }
 };
 
+enum class TangentKind {
+  exact,  // the second derivative of the energy
+  upper,  // without the part of the membrane's geometric stiffness that compression makes negative
+};
+
 // Surface functions at a material point in the fabric's own rest coordinates (weft = 1, warp = 2): row r of the arrays
 // holds N, N_,1, N_,2, N_,11, N_,22, N_,12 for control points `index` (global numbers). [eqs. 5-7]
 struct MaterialPoint {
@@ -50,6 +55,8 @@ struct ShellState {
 //   (4) bending is not assembled where b0 = 0, membrane not where all k = 0.
 class ShellModel {
  public:
+  // Throws GeometryError where a panel's rest surface has no tangent plane or its degree is above 7, Error for a fabric
+  // with impossible numbers.
   explicit ShellModel(std::vector<ShellPanel> panels);
   ~ShellModel();
   ShellModel(ShellModel&&) noexcept;
@@ -65,14 +72,22 @@ class ShellModel {
   // Overwrites `force` with the internal force [N] at q. Allocates nothing.
   ShellEnergy internal_force(const Eigen::Ref<const Eigen::VectorXd>& q, Eigen::Ref<Eigen::VectorXd> force) const;
 
-  // Action of the tangent stiffness at q: df = K(q) dq, material and positive geometric parts, so that K is an upper
-  // estimate of the true tangent (what a step size bound wants). Allocates nothing.
+  // Action of the tangent stiffness at q: df = K(q) dq. TangentKind::upper leaves out what compression subtracts from the
+  // membrane's geometric stiffness (what a step size bound wants), TangentKind::exact is the derivative of -force.
+  // Allocates nothing.
   void apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
-                     Eigen::Ref<Eigen::VectorXd> df) const;
+                     Eigen::Ref<Eigen::VectorXd> df, TangentKind kind = TangentKind::upper) const;
 
-  // The cell whose share of dq . K(q) dq per mass is largest: (panel, i, j).
+  // The cell with the largest share of dq . K(q) dq, and that share's parts.
   struct Cell { int panel = 0, i = 0, j = 0; };
-  Cell stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq) const;
+  struct CellShare {
+    Cell cell;
+    double membrane = 0, bending = 0;  // J, for dq in m
+  };
+  CellShare stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq) const;
+
+  std::size_t quadrature_points() const;
+  std::size_t table_bytes() const;  // memory of the stored functions
 
   MaterialPoint material_point(int panel, double u, double v) const;
   ShellState state(int panel, double u, double v, const Eigen::Ref<const Eigen::VectorXd>& q) const;
