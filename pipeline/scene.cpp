@@ -1,0 +1,717 @@
+#include "pipeline/scene.h"
+
+#include <fmt/format.h>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wconversion"
+#pragma GCC diagnostic ignored "-Wshadow"
+#include <toml++/toml.h>
+#pragma GCC diagnostic pop
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+
+#include "geometry/error.h"
+#include "io/file.h"
+#include "io/iges.h"
+#include "pipeline/units.h"
+
+namespace toile {
+namespace {
+
+constexpr double degree_in_radians = std::numbers::pi / 180;
+
+int edit_distance(std::string_view a, std::string_view b) {
+  std::vector<int> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = static_cast<int>(j);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    int diagonal = row[0];
+    row[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const int replaced = diagonal + (a[i - 1] != b[j - 1]);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row[b.size()];
+}
+
+// "; did you mean 'grain_deg'?", or the list of what is possible.
+std::string suggestion(std::string_view word, const std::vector<std::string>& possible) {
+  const std::string* best = nullptr;
+  int distance = std::max(2, static_cast<int>(word.size()) / 3);
+  for (const std::string& p : possible) {
+    const int d = edit_distance(word, p);
+    if (d <= distance && (!best || d < distance)) {
+      best = &p;
+      distance = d;
+    }
+  }
+  if (best) return fmt::format("; did you mean '{}'?", *best);
+  return fmt::format("; possible are {}", fmt::join(possible, ", "));
+}
+
+const char* type_name(const toml::node& node) {
+  switch (node.type()) {
+    case toml::node_type::table: return "a table";
+    case toml::node_type::array: return "an array";
+    case toml::node_type::string: return "a string";
+    case toml::node_type::integer: return "a whole number";
+    case toml::node_type::floating_point: return "a number";
+    case toml::node_type::boolean: return "true or false";
+    default: return "a date or time";
+  }
+}
+
+enum class Range { any, nonnegative, positive };
+
+// Keys of one table, each asked for by name; what nobody asked for is an error.
+class Table {
+ public:
+  Table(const toml::table& table, std::string name, std::string file)
+      : table_(table), name_(std::move(name)), file_(std::move(file)) {}
+
+  const toml::node* find(const std::string& key) {
+    known_.push_back(key);
+    return table_.get(key);
+  }
+
+  std::string place(const toml::node& node) const {
+    const auto line = node.source().begin.line;
+    return line > 0 ? fmt::format("{}:{}", file_, line) : file_ + " (--set)";
+  }
+  std::string where() const { return place(table_); }
+  [[noreturn]] void fail(const toml::node& node, const std::string& what) const {
+    throw InputError(place(node) + ": " + what);
+  }
+  [[noreturn]] void missing(const std::string& key, const std::string& what) const {
+    throw InputError(fmt::format("{}: {} needs {} ({})", where(), name_, key, what));
+  }
+  std::string label(const std::string& key) const { return fmt::format("{} in {}", key, name_); }
+
+  double quantity(const toml::node& node, const std::string& what, const Dimension& dimension, Range range,
+                  double bare_unit = 1) {
+    double value = 0;
+    if (node.is_integer() || node.is_floating_point()) {
+      value = bare_unit * *node.value<double>();
+    } else if (const auto text = node.value<std::string>(); text && node.is_string()) {
+      try {
+        value = parse_quantity(*text, dimension);
+      } catch (const InputError& error) {
+        fail(node, fmt::format("{}: {}", what, error.what()));
+      }
+    } else {
+      fail(node, fmt::format("{} must be {} or a string with a unit, not {}", what, expected(dimension), type_name(node)));
+    }
+    if (!std::isfinite(value)) fail(node, fmt::format("{} must be finite", what));
+    if (range == Range::positive && !(value > 0)) fail(node, fmt::format("{} is {}, must be positive", what, value));
+    if (range == Range::nonnegative && value < 0) fail(node, fmt::format("{} is {}, must not be negative", what, value));
+    return value;
+  }
+  std::optional<double> number(const std::string& key, const Dimension& dimension, Range range, double bare_unit = 1) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    return quantity(*node, label(key), dimension, range, bare_unit);
+  }
+  void number(double& target, const std::string& key, const Dimension& dimension, Range range, double bare_unit = 1) {
+    if (const auto value = number(key, dimension, range, bare_unit)) target = *value;
+  }
+  template <int N>
+  std::optional<Eigen::Matrix<double, N, 1>> vector(const std::string& key, const Dimension& dimension,
+                                                    double bare_unit = 1) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const toml::array* array = node->as_array();
+    if (!array || array->size() != N) {
+      fail(*node, fmt::format("{} must be an array of {} numbers ({})", label(key), N, unit_name(dimension)));
+    }
+    Eigen::Matrix<double, N, 1> result;
+    for (int i = 0; i < N; ++i) {
+      result[i] = quantity((*array)[static_cast<std::size_t>(i)], fmt::format("entry {} of {}", i, label(key)), dimension,
+                           Range::any, bare_unit);
+    }
+    return result;
+  }
+  std::optional<int> integer(const std::string& key, int least, int most) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    return integer(*node, label(key), least, most);
+  }
+  int integer(const toml::node& node, const std::string& what, int least, int most) {
+    const auto value = node.is_integer() ? node.value<std::int64_t>() : std::nullopt;
+    if (!value) fail(node, fmt::format("{} must be a whole number, not {}", what, type_name(node)));
+    if (*value < least || *value > most) fail(node, fmt::format("{} is {}, must be {} to {}", what, *value, least, most));
+    return static_cast<int>(*value);
+  }
+  std::optional<std::array<int, 2>> integers(const std::string& key, int least, int most) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    const toml::array* array = node->as_array();
+    if (!array || array->size() != 2) fail(*node, fmt::format("{} must be two whole numbers [u, v]", label(key)));
+    return std::array<int, 2>{integer((*array)[0], label(key), least, most), integer((*array)[1], label(key), least, most)};
+  }
+  std::optional<std::string> string(const std::string& key) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    if (!node->is_string()) fail(*node, fmt::format("{} must be a string, not {}", label(key), type_name(*node)));
+    return *node->value<std::string>();
+  }
+  std::optional<bool> boolean(const std::string& key) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    if (!node->is_boolean()) fail(*node, fmt::format("{} must be true or false, not {}", label(key), type_name(*node)));
+    return *node->value<bool>();
+  }
+  // One of `now`; those of `later` are refused with a reason of their own.
+  std::optional<std::string> choice(const std::string& key, const std::vector<std::string>& now,
+                                    const std::vector<std::string>& later) {
+    const auto value = string(key);
+    if (!value) return std::nullopt;
+    const toml::node& node = *table_.get(key);
+    if (std::ranges::find(later, *value) != later.end()) {
+      fail(node, fmt::format("{} = \"{}\" is not supported by this version; use {}", label(key), *value, fmt::join(now, " or ")));
+    }
+    if (std::ranges::find(now, *value) == now.end()) {
+      fail(node, fmt::format("unknown {} \"{}\"{}", label(key), *value, suggestion(*value, now)));
+    }
+    return value;
+  }
+  std::optional<Table> table(const std::string& key, const std::string& name) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    return as_table(*node, name);
+  }
+  Table as_table(const toml::node& node, const std::string& name) const {
+    if (!node.is_table()) fail(node, fmt::format("{} must be a table, not {}", name, type_name(node)));
+    return Table(*node.as_table(), name, file_);
+  }
+  // The tables of an array of tables.
+  std::vector<Table> tables(const std::string& key, const std::string& name) {
+    const toml::node* node = find(key);
+    if (!node) return {};
+    const toml::array* array = node->as_array();
+    if (!array) fail(*node, fmt::format("{} must be an array of tables: write {}", key, name));
+    std::vector<Table> result;
+    for (const toml::node& entry : *array) result.push_back(as_table(entry, name));
+    return result;
+  }
+  void refuse(const std::string& key, const std::string& why) {
+    const toml::node* node = find(key);
+    known_.pop_back();
+    if (node) fail(*node, why);
+  }
+
+  const toml::table& raw() const { return table_; }
+  void done() const {
+    for (const auto& [key, node] : table_) {
+      const std::string_view name = key.str();
+      if (std::ranges::find(known_, name) != known_.end()) continue;
+      const auto line = key.source().begin.line;
+      const std::string at = line > 0 ? fmt::format("{}:{}", file_, line) : file_ + " (--set)";
+      throw InputError(fmt::format("{}: unknown key '{}' in {}{}", at, name, name_, suggestion(name, known_)));
+    }
+  }
+
+ private:
+  static std::string expected(const Dimension& dimension) {
+    return dimension == dimension::none ? "a number" : fmt::format("a number in {}", unit_name(dimension));
+  }
+
+  const toml::table& table_;
+  std::string name_, file_;
+  std::vector<std::string> known_;
+};
+
+std::string stem_of(const std::string& name, std::string_view suffix) {
+  return name.substr(0, name.size() - suffix.size());
+}
+
+std::vector<std::string> split_path(const std::string& path, const std::string& setting) {
+  std::vector<std::string> parts;
+  std::string part;
+  for (const char c : path) {
+    if (c == '.' || c == '[' || c == ']') {
+      if (!part.empty()) parts.push_back(std::exchange(part, {}));
+    } else {
+      part += c;
+    }
+  }
+  if (!part.empty()) parts.push_back(part);
+  if (parts.empty()) throw InputError(fmt::format("--set {}: expected key=value", setting));
+  return parts;
+}
+
+void assign(toml::table& root, const std::string& setting) {
+  const std::size_t equals = setting.find('=');
+  if (equals == std::string::npos) throw InputError(fmt::format("--set {}: expected key=value", setting));
+  std::string key = setting.substr(0, equals);
+  while (!key.empty() && key.back() == ' ') key.pop_back();
+  const std::vector<std::string> parts = split_path(key, setting);
+  const std::string value = setting.substr(equals + 1);
+  toml::table parsed;
+  try {
+    parsed = toml::parse("x = " + value);
+    if (parsed.size() != 1) throw InputError(fmt::format("--set {}: expected one value", setting));
+  } catch (const toml::parse_error&) {
+    // Shells eat quotes: what isn't TOML is a string.
+    parsed.insert_or_assign("x", value);
+  }
+  toml::node& fresh = *parsed.get("x");
+
+  toml::node* node = &root;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const bool last = k + 1 == parts.size();
+    if (toml::table* table = node->as_table()) {
+      if (last) {
+        table->insert_or_assign(parts[k], fresh);
+        return;
+      }
+      toml::node* next = table->get(parts[k]);
+      if (!next) {
+        const bool index = parts[k + 1].find_first_not_of("0123456789") == std::string::npos;
+        if (index) {
+          table->insert_or_assign(parts[k], toml::array{});
+        } else {
+          table->insert_or_assign(parts[k], toml::table{});
+        }
+        next = table->get(parts[k]);
+      }
+      node = next;
+    } else if (toml::array* array = node->as_array()) {
+      std::size_t index = 0;
+      const auto [end, error] = std::from_chars(parts[k].data(), parts[k].data() + parts[k].size(), index);
+      if (error != std::errc() || end != parts[k].data() + parts[k].size() || index > array->size()) {
+        throw InputError(fmt::format("--set {}: '{}' must be an index from 0 to {}", setting, parts[k], array->size()));
+      }
+      if (last) {
+        if (index == array->size()) {
+          array->push_back(fresh);
+        } else {
+          array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(index), fresh);
+        }
+        return;
+      }
+      if (index == array->size()) array->push_back(toml::table{});
+      node = array->get(index);
+    } else {
+      throw InputError(fmt::format("--set {}: '{}' is {}, which holds no keys", setting, parts[k - 1], type_name(*node)));
+    }
+  }
+}
+
+Placement read_placement(Table table) {
+  Placement place;
+  if (const auto v = table.vector<3>("translate", dimension::length)) place.translate = *v;
+  if (const auto v = table.vector<3>("rotate_deg", dimension::angle, degree_in_radians)) place.rotate = *v;
+  table.done();
+  return place;
+}
+
+Fabric read_fabric(Table table) {
+  Fabric fabric;
+  if (const auto base = table.string("like")) {
+    const auto presets = fabric_presets();
+    const auto it = std::ranges::find(presets, *base, &FabricPreset::name);
+    if (it == presets.end()) {
+      std::vector<std::string> names;
+      for (const FabricPreset& p : presets) names.push_back(p.name);
+      table.fail(*table.raw().get("like"), fmt::format("unknown fabric '{}'{}", *base, suggestion(*base, names)));
+    }
+    fabric = it->fabric;
+  }
+  table.number(fabric.density, "density", dimension::area_density, Range::positive);
+  table.number(fabric.thickness, "thickness", dimension::length, Range::positive);
+  if (auto membrane = table.table("membrane", "membrane")) {
+    membrane->number(fabric.membrane.weft, "weft", dimension::force_per_length, Range::nonnegative);
+    membrane->number(fabric.membrane.warp, "warp", dimension::force_per_length, Range::nonnegative);
+    membrane->number(fabric.membrane.shear, "shear", dimension::force_per_length, Range::nonnegative);
+    membrane->done();
+  }
+  if (auto bending = table.table("bending", "bending")) {
+    Fabric::Bending& law = fabric.bending;
+    bending->number(law.b0, "b0", dimension::moment, Range::nonnegative);
+    bending->number(law.kappa0, "kappa0", dimension::curvature, Range::positive);
+    law.kappa_reg = bending->number("kappa_reg", dimension::curvature, Range::positive).value_or(law.kappa0 / 1000);
+    bending->number(law.twist, "twist", dimension::moment, Range::nonnegative);
+    if (law.kappa_reg > law.kappa0) {
+      const toml::node* node = bending->raw().get("kappa_reg");
+      throw InputError(fmt::format("{}: kappa_reg in bending is {} 1/m, must not exceed kappa0 = {} 1/m",
+                                   node ? bending->place(*node) : bending->where(), law.kappa_reg, law.kappa0));
+    }
+    bending->done();
+  }
+  table.number(fabric.drag, "drag", dimension::area_drag, Range::nonnegative);
+  table.number(fabric.friction, "friction", dimension::none, Range::nonnegative);
+  if (const auto curvature = table.choice("rest_curvature", {"panel", "zero"}, {})) {
+    fabric.rest_curvature = *curvature == "zero" ? RestCurvature::zero : RestCurvature::panel;
+  }
+  table.choice("law", {"weft-warp"}, {"isotropic", "orthotropic-3d"});
+  table.done();
+  return fabric;
+}
+
+std::filesystem::path beside(const std::filesystem::path& scene, const std::string& file) {
+  const std::filesystem::path path(file);
+  return path.is_absolute() ? path : scene.parent_path() / path;
+}
+
+struct Fabrics {
+  std::vector<std::pair<std::string, Fabric>> named;
+  std::vector<std::string> names() const {
+    std::vector<std::string> result;
+    for (const auto& [name, fabric] : named) result.push_back(name);
+    for (const FabricPreset& preset : fabric_presets()) result.push_back(preset.name);
+    return result;
+  }
+  const Fabric* find(const std::string& name) const {
+    for (const auto& [n, fabric] : named) {
+      if (n == name) return &fabric;
+    }
+    for (const FabricPreset& preset : fabric_presets()) {
+      if (preset.name == name) return &preset.fabric;
+    }
+    return nullptr;
+  }
+};
+
+ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fabrics& fabrics) {
+  ScenePanel panel;
+  panel.where = table.where();
+  panel.name = table.string("name").value_or("");
+  if (table.find("pattern")) {
+    table.fail(*table.raw().get("pattern"), "pattern files are not supported by this version; use file = \"panel.igs\"");
+  }
+  const auto file = table.string("file");
+  if (!file) table.missing("file", "the IGES file that holds the panel, relative to the scene");
+  panel.file = beside(scene, *file);
+  if (!std::filesystem::exists(panel.file)) {
+    table.fail(*table.raw().get("file"), fmt::format("file '{}' does not exist", panel.file.string()));
+  }
+  panel.start = table.string("start");
+  if (auto refine = table.table("refine", "refine")) {
+    panel.degree = refine->integer("degree", 2, 5);
+    panel.span = refine->number("span", dimension::length, Range::positive);
+    panel.spans = refine->integers("spans", 1, 10000);
+    panel.control_points = refine->integers("control_points", 2, 10000);
+    if (panel.span.has_value() + panel.spans.has_value() + panel.control_points.has_value() > 1) {
+      throw InputError(refine->where() + ": refine takes one of span, spans and control_points");
+    }
+    refine->done();
+  }
+  table.number(panel.grain, "grain_deg", dimension::angle, Range::any, degree_in_radians);
+  if (auto place = table.table("place", "place")) panel.place = read_placement(*place);
+  panel.fabric_name = table.string("fabric").value_or("kidnapped");
+  const Fabric* fabric = fabrics.find(panel.fabric_name);
+  if (!fabric) {
+    table.fail(*table.raw().get("fabric"),
+               fmt::format("unknown fabric '{}'{}", panel.fabric_name, suggestion(panel.fabric_name, fabrics.names())));
+  }
+  panel.fabric = *fabric;
+  table.done();
+  return panel;
+}
+
+// The panel that a pin, traction or output point names; may be left out where there is only one.
+std::string panel_key(Table& table, const std::vector<ScenePanel>& panels) {
+  const auto name = table.string("panel");
+  if (!name) {
+    if (panels.size() == 1) return panels[0].name;
+    table.missing("panel", "the scene has several");
+  }
+  std::vector<std::string> names;
+  for (const ScenePanel& panel : panels) names.push_back(panel.name);
+  if (std::ranges::find(names, *name) == names.end()) {
+    table.fail(*table.raw().get("panel"), fmt::format("no panel is called '{}'{}", *name, suggestion(*name, names)));
+  }
+  return *name;
+}
+
+Address address(Table& table, const std::string& key) {
+  const auto text = table.string(key);
+  if (!text) table.missing(key, "an address such as corner:0,0");
+  try {
+    return parse_address(*text);
+  } catch (const InputError& error) {
+    table.fail(*table.raw().get(key), error.what());
+  }
+}
+
+ScenePin read_pin(Table table, const std::vector<ScenePanel>& panels) {
+  ScenePin pin;
+  pin.where = table.where();
+  pin.panel = panel_key(table, panels);
+  pin.at = address(table, "at");
+  pin.clamp = table.boolean("clamp").value_or(false);
+  if (auto move = table.table("move", "move")) {
+    PinMotion motion;
+    if (const auto v = move->vector<3>("translate", dimension::length)) motion.translate = *v;
+    if (const auto v = move->vector<3>("rotate_deg", dimension::angle, degree_in_radians)) motion.rotate = *v;
+    motion.centre = move->vector<3>("centre", dimension::length);
+    move->number(motion.start, "start", dimension::time, Range::nonnegative);
+    const auto end = move->number("end", dimension::time, Range::positive);
+    if (!end) move->missing("end", "the time at which the motion is complete");
+    motion.end = *end;
+    if (!(motion.start < motion.end)) {
+      move->fail(*move->raw().get("end"), fmt::format("end in move is {} s, must come after start = {} s", motion.end, motion.start));
+    }
+    move->done();
+    pin.move = motion;
+  }
+  pin.release = table.number("release", dimension::time, Range::nonnegative);
+  table.done();
+  return pin;
+}
+
+SceneTraction read_traction(Table table, const std::vector<ScenePanel>& panels) {
+  SceneTraction traction;
+  traction.where = table.where();
+  traction.panel = panel_key(table, panels);
+  traction.along = address(table, "along");
+  if (traction.along.kind != Address::Kind::edge && traction.along.kind != Address::Kind::curve) {
+    table.fail(*table.raw().get("along"), fmt::format("along = \"{}\": expected edge:... or curve:...", traction.along.text));
+  }
+  const auto force = table.vector<3>("force", dimension::force_per_length);
+  if (!force) table.missing("force", "a vector in N/m");
+  traction.force = *force;
+  table.done();
+  return traction;
+}
+
+void read_output(Table table, Scene& scene) {
+  table.number(scene.every, "every", dimension::time, Range::positive);
+  if (const toml::node* node = table.find("formats")) {
+    const toml::array* array = node->as_array();
+    if (!array) table.fail(*node, "formats in [output] must be an array such as [\"iges\", \"vtu\"]");
+    scene.formats.clear();
+    for (const toml::node& entry : *array) {
+      const std::string name = entry.value<std::string>().value_or("");
+      if (name == "iges") {
+        scene.formats.push_back(FrameFormat::iges);
+      } else if (name == "vtu") {
+        scene.formats.push_back(FrameFormat::vtu);
+      } else if (name == "obj") {
+        scene.formats.push_back(FrameFormat::obj);
+      } else if (name == "ply" || name == "stl" || name == "glb" || name == "gltf") {
+        table.fail(entry, fmt::format("frames as {} are not supported by this version; use iges, vtu or obj", name));
+      } else {
+        table.fail(entry, fmt::format("unknown frame format '{}'{}", name, suggestion(name, {"iges", "vtu", "obj"})));
+      }
+    }
+  }
+  if (const auto preview = table.boolean("preview")) scene.preview = *preview;
+  for (Table& point : table.tables("points", "points")) {
+    OutputPoint p;
+    p.where = point.where();
+    p.panel = panel_key(point, scene.panels);
+    const auto uv = point.vector<2>("uv", dimension::none);
+    if (!uv) point.missing("uv", "parameters on the panel");
+    p.uv = *uv;
+    point.done();
+    scene.points.push_back(p);
+  }
+  table.done();
+}
+
+std::string scene_name(const std::filesystem::path& path) {
+  const std::string stem = path.stem().string();
+  if (stem != "scene") return stem;
+  const std::string folder = std::filesystem::absolute(path).lexically_normal().parent_path().filename().string();
+  return folder.empty() ? stem : folder;
+}
+
+void read_limit(Table table, Scene& scene) {
+  const auto mode = table.choice("mode", {"inextensible", "off"}, {"band"});
+  scene.strain_limit.on = !mode || *mode == "inextensible";
+  table.number(scene.strain_limit.tolerance, "tolerance", dimension::none, Range::positive);
+  table.choice("solver", {"fast"}, {"lagrange", "springs"});
+  table.choice("points", {"knot-mesh"}, {"gauss-2x2", "gauss-1", "cell-average", "greville"});
+  table.number(scene.strain_limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
+  if (const auto n = table.integer("max_iterations", 1, 10000)) scene.strain_limit.max_iterations = *n;
+  for (const char* key : {"stretch", "compress"}) {
+    table.refuse(key, fmt::format("{} belongs to mode = \"band\", which this version does not support", key));
+  }
+  table.done();
+}
+
+void read_solver(Table table, Scene& scene) {
+  table.choice("model", {"shell"}, {"hinge", "solid", "spring", "fem"});
+  table.choice("scheme", {"verlet"}, {"newmark", "backward-euler"});
+  if (const toml::node* node = table.find("dt")) {
+    if (!(node->is_string() && *node->value<std::string>() == "auto")) {
+      scene.dt = table.quantity(*node, "dt in [solver]", dimension::time, Range::positive);
+    }
+  }
+  if (const toml::node* node = table.find("until")) {
+    if (node->is_string() && *node->value<std::string>() == "rest") {
+      table.fail(*node, "until = \"rest\" is not supported by this version; give a time such as \"1 s\"");
+    }
+    scene.until = table.quantity(*node, "until in [solver]", dimension::time, Range::positive);
+  }
+  table.done();
+}
+
+// The tables that don't depend on the panels' own tables.
+void read_settings(Table& top, Scene& scene) {
+  if (auto table = top.table("strain_limit", "[strain_limit]")) read_limit(*table, scene);
+  if (auto table = top.table("load", "[load]")) {
+    if (const auto v = table->vector<3>("gravity", dimension::acceleration)) scene.gravity = *v;
+    if (const auto v = table->vector<3>("wind", dimension::velocity)) scene.wind = *v;
+    table->done();
+  }
+  if (auto table = top.table("solver", "[solver]")) read_solver(*table, scene);
+  if (auto table = top.table("output", "[output]")) read_output(*table, scene);
+}
+
+Scene read_tables(toml::table& root, const std::filesystem::path& path, std::span<const std::string> settings) {
+  for (const std::string& setting : settings) assign(root, setting);
+  Scene scene;
+  scene.path = path;
+  scene.name = scene_name(path);
+  Table top(root, "the scene", path.string());
+  for (const char* key : {"seam", "obstacle", "contact_pair"}) {
+    top.refuse(key, fmt::format("[[{}]] is not supported by this version, which drapes panels with pins, tractions, "
+                                "gravity and wind",
+                                key));
+  }
+  Fabrics fabrics;
+  if (auto table = top.table("fabric", "[fabric]")) {
+    for (const auto& [name, node] : table->raw()) {
+      fabrics.named.emplace_back(name.str(), read_fabric(table->as_table(node, fmt::format("[fabric.{}]", name.str()))));
+    }
+  }
+  for (Table& table : top.tables("panel", "[[panel]]")) {
+    scene.panels.push_back(read_panel(table, path, fabrics));
+    ScenePanel& panel = scene.panels.back();
+    for (std::size_t k = 0; k + 1 < scene.panels.size(); ++k) {
+      if (scene.panels[k].file == panel.file) ++panel.order;
+      if (!panel.name.empty() && scene.panels[k].name == panel.name) {
+        throw InputError(fmt::format("{}: two panels are called '{}'", panel.where, panel.name));
+      }
+    }
+    if (panel.name.empty()) {
+      panel.named = false;
+      panel.name = fmt::format("panel {}", scene.panels.size());
+    }
+  }
+  if (scene.panels.empty()) throw InputError(fmt::format("{}: the scene has no [[panel]]", path.string()));
+  for (Table& table : top.tables("pin", "[[pin]]")) scene.pins.push_back(read_pin(table, scene.panels));
+  for (Table& table : top.tables("traction", "[[traction]]")) {
+    scene.tractions.push_back(read_traction(table, scene.panels));
+  }
+  read_settings(top, scene);
+  top.done();
+  return scene;
+}
+
+}  // namespace
+
+Eigen::Matrix3d Placement::rotation() const {
+  using Eigen::AngleAxisd;
+  using Eigen::Vector3d;
+  if (rotate.isZero(0)) return Eigen::Matrix3d::Identity();
+  return (AngleAxisd(rotate[2], Vector3d::UnitZ()) * AngleAxisd(rotate[1], Vector3d::UnitY()) *
+          AngleAxisd(rotate[0], Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& mean, double t) const {
+  const double tau = std::clamp((t - start) / (end - start), 0.0, 1.0);
+  if (tau == 0) return x;
+  const double s = tau * tau * tau * (10 + tau * (-15 + 6 * tau));
+  const Eigen::Vector3d c = centre.value_or(mean);
+  return c + Placement{{0, 0, 0}, s * rotate}.rotation() * (x - c) + s * translate;
+}
+
+Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
+  toml::table root;
+  try {
+    root = toml::parse(text, path.string());
+  } catch (const toml::parse_error& error) {
+    throw InputError(fmt::format("{}:{}: {}", path.string(), error.source().begin.line, error.description()));
+  }
+  return read_tables(root, path, settings);
+}
+
+Scene read_scene(const std::filesystem::path& path, std::span<const std::string> settings) {
+  return parse_scene(read_file(path), path, settings);
+}
+
+Scene quick_scene(const QuickScene& request, std::span<const std::string> settings) {
+  const PanelFile file = read_iges(request.file);
+  const auto has = [&](const std::string& name) {
+    return std::ranges::any_of(file.panels, [&](const TrimmedSurface& face) { return face.name == name; });
+  };
+  const auto ends = [](const std::string& name, std::string_view suffix) {
+    return name.size() > suffix.size() && std::string_view(name).substr(name.size() - suffix.size()) == suffix;
+  };
+  Scene scene;
+  scene.path = request.file;
+  scene.name = request.file.stem().string();
+  scene.strain_limit.on = true;
+  for (std::size_t k = 0; k < file.panels.size(); ++k) {
+    ScenePanel panel;
+    panel.name = file.panels[k].name;
+    panel.where = request.file.string();
+    panel.file = request.file;
+    if (ends(panel.name, draped_suffix) && has(stem_of(panel.name, draped_suffix) + std::string(flat_suffix))) continue;
+    if (ends(panel.name, flat_suffix) && has(stem_of(panel.name, flat_suffix) + std::string(draped_suffix))) {
+      panel.start = stem_of(panel.name, flat_suffix) + std::string(draped_suffix);
+    }
+    const bool taken = std::ranges::any_of(scene.panels, [&](const ScenePanel& p) { return p.name == panel.name; });
+    panel.named = !panel.name.empty() && !taken;
+    panel.order = static_cast<int>(k);
+    if (!panel.named) panel.name = fmt::format("panel {}", k + 1);
+    if (!panel.start) {
+      panel.degree = request.degree;
+      panel.span = request.span;
+    }
+    panel.fabric_name = request.fabric;
+    const auto presets = fabric_presets();
+    const auto preset = std::ranges::find(presets, request.fabric, &FabricPreset::name);
+    if (preset == presets.end()) throw InputError(fmt::format("--fabric: unknown fabric '{}'", request.fabric));
+    panel.fabric = preset->fabric;
+    scene.panels.push_back(std::move(panel));
+  }
+  if (scene.panels.empty()) throw InputError(fmt::format("{}: holds no panel", request.file.string()));
+  for (const std::string& text : request.pins) {
+    for (const ScenePanel& panel : scene.panels) {
+      ScenePin pin;
+      pin.panel = panel.name;
+      pin.at = parse_address(text);
+      pin.where = "--pin " + text;
+      scene.pins.push_back(std::move(pin));
+    }
+  }
+  // The settings of a scene file's own tables apply here too.
+  toml::table root;
+  for (const std::string& setting : settings) assign(root, setting);
+  Table top(root, "the scene", "--set");
+  read_settings(top, scene);
+  top.done();
+  return scene;
+}
+
+std::span<const FabricPreset> fabric_presets() {
+  // k/rho, rho, eta, B0 of the examples of Peng & Zheng 2022; k h = (k/rho) rho, shear k/2.5.
+  static const auto make = [](double k_over_rho, double density, double drag, double b0, double friction) {
+    Fabric f;
+    f.density = density;
+    f.thickness = 0.001177;
+    f.membrane = {k_over_rho * density, k_over_rho * density, k_over_rho * density / 2.5};
+    f.bending = {b0, 30, 0.03, 0};
+    f.drag = drag;
+    f.friction = friction;
+    return f;
+  };
+  static const std::array<FabricPreset, 3> presets = {
+      FabricPreset{"kidnapped", "cloth of example 4.1(a), Peng & Zheng 2022", make(100, 0.117, 0.351, 3.3e-3, 0.3)},
+      FabricPreset{"armor", "soft armor of example 4.2(a)", make(50, 0.1177, 0.353, 1e-4, 0.2)},
+      FabricPreset{"skirt", "skirt of example 4.3(a)", make(50, 0.118, 0.354, 1e-5, 0.8)},
+  };
+  return presets;
+}
+
+}  // namespace toile

@@ -1,0 +1,126 @@
+// The scene file: what is draped, of what, held where, for how long. (README, "The scene file")
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "analysis/fabric/fabric.h"
+#include "pipeline/addresses.h"
+
+namespace toile {
+
+// x -> translate + R x; R turns about the x, then the y, then the z axis of the scene.
+struct Placement {
+  Eigen::Vector3d translate{0, 0, 0};  // m
+  Eigen::Vector3d rotate{0, 0, 0};     // rad
+  Eigen::Matrix3d rotation() const;
+};
+
+struct ScenePanel {
+  std::string name;                  // a face of the file by its name, else by its order
+  bool named = true;                 // false: `name` was made up, the face is taken by its order
+  int order = 0;                     // of this panel among those of the scene that come from the same file
+  std::filesystem::path file;
+  std::optional<std::string> start;  // face of the same file and knots whose net is the initial place; else the rest
+  std::optional<int> degree;
+  std::optional<double> span;        // m
+  std::optional<std::array<int, 2>> spans, control_points;
+  double grain = 0;                  // rad
+  Placement place;                   // of the rest and of the start
+  Fabric fabric;
+  std::string fabric_name;
+  std::string where;                 // "scene.toml:12", for messages
+};
+
+// Smooth motion of what a pin holds: the rigid motion (turn about centre, then translate) is scaled by a quintic that
+// rises from 0 to 1 between start and end with velocity and acceleration 0 at both.
+struct PinMotion {
+  Eigen::Vector3d translate{0, 0, 0};     // m
+  Eigen::Vector3d rotate{0, 0, 0};        // rad, about x, then y, then z
+  std::optional<Eigen::Vector3d> centre;  // m; unset: mean of the held points
+  double start = 0, end = 1;              // s
+  Eigen::Vector3d operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& mean, double t) const;
+};
+
+struct ScenePin {
+  std::string panel;
+  Address at;
+  bool clamp = false;
+  std::optional<PinMotion> move;
+  std::optional<double> release;  // s
+  std::string where;
+};
+
+struct SceneTraction {
+  std::string panel;
+  Address along;
+  Eigen::Vector3d force{0, 0, 0};  // N/m of rest length, dead
+  std::string where;
+};
+
+struct StrainLimit {
+  bool on = false;
+  double tolerance = 0.01;
+  double regularisation = 1e-4;
+  int max_iterations = 50;
+};
+
+struct OutputPoint {
+  std::string panel;
+  Eigen::Vector2d uv{0, 0};
+  std::string where;
+};
+
+enum class FrameFormat { iges, vtu, obj };
+
+// Complete, SI, every key consumed.
+struct Scene {
+  std::string name;
+  std::filesystem::path path;
+  std::vector<ScenePanel> panels;  // empty: all panels of `panel_file`
+  std::vector<ScenePin> pins;
+  std::vector<SceneTraction> tractions;
+  StrainLimit strain_limit;
+  Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
+  Eigen::Vector3d wind{0, 0, 0};         // m/s
+  std::optional<double> dt;              // s; unset: chosen from the eigenvalue bound
+  double until = 1;                      // s
+  double every = 1.0 / 30;               // s between frames
+  std::vector<FrameFormat> formats{FrameFormat::vtu};
+  bool preview = true;
+  std::vector<OutputPoint> points;
+};
+
+// Reads a scene; `settings` are "key.path=value" with TOML values (a value that isn't TOML is taken as a string) and
+// override or add keys. Throws InputError `scene.toml:12: ...`.
+Scene read_scene(const std::filesystem::path& path, std::span<const std::string> settings = {});
+Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings = {});
+
+// The scene of `toile drape panel.igs --pin ...`: every panel of the file, strain limited, each pin on every panel. A
+// flat and a draped face of one name (draped.igs) make one panel that starts from the draped one.
+struct QuickScene {
+  std::filesystem::path file;
+  std::vector<std::string> pins;
+  std::optional<int> degree;
+  std::optional<double> span;  // m
+  std::string fabric = "kidnapped";
+};
+Scene quick_scene(const QuickScene& request, std::span<const std::string> settings = {});
+
+// Names in draped.igs: the flat face of panel "front" is "front flat", the draped one "front draped".
+inline constexpr std::string_view flat_suffix = " flat";
+inline constexpr std::string_view draped_suffix = " draped";
+
+// Fabrics that need no [fabric.*] table.
+struct FabricPreset {
+  std::string name, about;
+  Fabric fabric;
+};
+std::span<const FabricPreset> fabric_presets();
+
+}  // namespace toile
