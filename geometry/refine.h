@@ -2,10 +2,10 @@
 // panels, Bezier extraction, splitting, reversal.
 #pragma once
 
-#include <optional>
 #include <array>
+#include <optional>
 #include <span>
-#include <string>
+#include <utility>
 #include <vector>
 
 #include "geometry/nurbs_curve.h"
@@ -24,15 +24,19 @@ template <int Dim>
 NurbsCurve<Dim> clamp(const NurbsCurve<Dim>& curve);
 NurbsSurface clamp(const NurbsSurface& surface);
 
+// The same geometry in a higher degree (up to max_degree) on clamped knots; every interior multiplicity grows by the
+// difference, so continuity stays.
 template <int Dim>
 NurbsCurve<Dim> elevate_degree(const NurbsCurve<Dim>& curve, int degree);
 NurbsSurface elevate_degree(const NurbsSurface& surface, Direction direction, int degree);
 
 // Removes one occurrence of an interior knot when the geometry stays within `tolerance` (a length in the units of the
-// control points; the bound holds over the whole domain); nullopt where it doesn't. [Piegl & Tiller 1997, A5.8]
+// control points; the bound holds over the whole domain); nullopt where it doesn't. `deviation` takes the
+// bound reached. Throws GeometryError where `knot` is no interior knot. [Piegl & Tiller 1997, A5.8]
 template <int Dim>
 std::optional<NurbsCurve<Dim>> remove_knot(const NurbsCurve<Dim>& curve, double knot, double tolerance);
-std::optional<NurbsSurface> remove_knot(const NurbsSurface& surface, Direction direction, double knot, double tolerance);
+std::optional<NurbsSurface> remove_knot(const NurbsSurface& surface, Direction direction, double knot, double tolerance,
+                                        double* deviation = nullptr);
 
 // The affine map (u, v) -> origin + u * du + v * dv that the surface is, when it is one within `tolerance` (length).
 struct AffinePatch {
