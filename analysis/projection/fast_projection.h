@@ -26,18 +26,23 @@ struct ProjectionReport {
   int worst_row = -1;             // strain row with the largest |C|
 };
 
-//   (1) fixed control points don't move; (2) linear and angular momentum are kept where nothing is pinned;
-//   (3) pattern analysed once, in the constructor.
+//   (1) fixed control points don't move;
+//   (2) linear momentum is kept where nothing is pinned, and every iteration's impulse has no moment about the places
+//       it started from (angular momentum);
+//   (3) pattern analysed once, in the constructor;
+//   (4) a strain row that touches only fixed control points takes no part and counts in no violation.
 class FastProjection {
  public:
+  // Throws SolverError where a node has no mass or a place row touches only fixed control points.
   FastProjection(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
                  const ProjectionOptions& options = {});
   ~FastProjection();
   FastProjection(FastProjection&&) noexcept;
   FastProjection& operator=(FastProjection&&) noexcept;
 
-  // Corrects x (free nodes) at time t. `impulse` in control points' dual space is left in `node_impulse()`:
-  // M (x_after - x_before) = -sum J^T lambda.
+  // Corrects x (free nodes) at time t: M (x_after - x_before) = -sum over iterations of J^T d lambda. Iterates until the
+  // tolerances are met, `max_iterations` are spent, or five iterations in a row gain nothing (constraints that
+  // contradict each other; going on would only pile up multipliers).
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t);
 
   // Sum over the last projection's iterations of the multipliers, per row [kg m2 for strain rows, kg m for place rows]:
@@ -45,6 +50,7 @@ class FastProjection {
   const Eigen::VectorXd& strain_multipliers() const;
   const Eigen::Matrix3Xd& place_multipliers() const;
   const ConstraintRows& rows() const;
+  const ProjectionOptions& options() const;
   std::size_t factor_nonzeros() const;
 
  private:

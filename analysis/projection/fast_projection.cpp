@@ -1,0 +1,222 @@
+#include "analysis/projection/fast_projection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "analysis/linear/cholesky.h"
+#include "analysis/projection/composed_rows.h"
+#include "geometry/error.h"
+
+namespace toile {
+namespace {
+
+constexpr int patience = 5;            // iterations without gain before giving up
+constexpr double least_gain = 0.99;    // a violation above this times the best so far is no gain
+constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
+
+}  // namespace
+
+// System rows: one per strain row, then three (x, y, z) per place row. Row i of J is (row of D) x direction_i: the
+// current tangent for strain rows, a unit vector for place rows; hence
+// (J M^-1 J^T)_ij = (D M^-1 D^T)_ij (direction_i . direction_j), whose first factor never changes.
+struct FastProjection::Impl {
+  AffineMap map;
+  ConstraintRows rows;
+  ProjectionOptions options;
+  ComposedRows composed;
+  std::vector<double> weight;         // composed.free.value / node mass
+  std::vector<double> gram_diagonal;  // per scalar row; 0: takes no part
+  std::vector<int> system_scalar;     // scalar row of each system row
+  SparsePattern pattern;
+  std::vector<double> gram, values;   // per entry of the pattern
+  std::unique_ptr<Cholesky> factor;
+
+  Eigen::Matrix3Xd y, direction, targets, fixed_places;  // direction: scaled, per system row
+  Eigen::VectorXd scale, residual, rhs, solution;
+  Eigen::VectorXd strain_lambda;
+  Eigen::Matrix3Xd place_lambda;
+
+  Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
+      : map(m), rows(std::move(r)), options(o), composed(compose(map, rows)) {}
+
+  int strains() const { return static_cast<int>(rows.strain.size()); }
+  int places() const { return static_cast<int>(rows.place.size()); }
+  int size() const { return strains() + 3 * places(); }
+
+  void build(const Eigen::VectorXd& node_mass);
+  void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
+  bool factorise();
+  void correct(Eigen::Ref<Eigen::VectorXd> x);
+};
+
+void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
+  if (node_mass.size() != map.nodes()) throw SolverError("projection: one mass per free node expected");
+  for (int k = 0; k < node_mass.size(); ++k)
+    if (!(node_mass[k] > 0))
+      throw SolverError("projection: control point " + std::to_string(map.node_control_point()[k]) + " has no mass");
+
+  weight = composed.free.value;
+  for (std::size_t e = 0; e < weight.size(); ++e) weight[e] /= node_mass[composed.free.column[e]];
+
+  const GramMatrix scalar = gram_matrix(composed.free, node_mass);
+  const int scalars = strains() + places();
+  gram_diagonal.resize(scalars);
+  for (int r = 0; r < scalars; ++r) gram_diagonal[r] = scalar.value[scalar.pattern.column_start[r]];
+  for (int p = 0; p < places(); ++p)
+    if (!(gram_diagonal[strains() + p] > 0))
+      throw SolverError("pin " + std::to_string(rows.place[p].pin) +
+                        " holds a point whose control points are all fixed by other pins: remove one of them");
+
+  for (int r = 0; r < strains(); ++r) system_scalar.push_back(r);
+  for (int p = 0; p < 3 * places(); ++p) system_scalar.push_back(strains() + p / 3);
+  pattern.column_start.push_back(0);
+  for (int c = 0; c < size(); ++c) {
+    const int sc = system_scalar[c];
+    for (int e = scalar.pattern.column_start[sc]; e < scalar.pattern.column_start[sc + 1]; ++e) {
+      const int sr = scalar.pattern.row[e];
+      const auto add = [&](int row) {
+        pattern.row.push_back(row);
+        gram.push_back(scalar.value[e]);
+      };
+      if (sr < strains())
+        add(sr);
+      else if (sc < strains())
+        for (int k = 0; k < 3; ++k) add(strains() + 3 * (sr - strains()) + k);
+      else
+        add(strains() + 3 * (sr - strains()) + (c - strains()) % 3);  // different components don't meet
+    }
+    pattern.column_start.push_back(static_cast<int>(pattern.row.size()));
+  }
+  values.resize(gram.size());
+  if (size() > 0) factor = std::make_unique<Cholesky>(pattern);
+
+  y.resize(3, scalars);
+  direction.resize(3, size());
+  targets.resize(3, places());
+  scale.resize(size());
+  residual.resize(size());
+  rhs.resize(size());
+  solution.resize(size());
+  strain_lambda = Eigen::VectorXd::Zero(strains());
+  place_lambda = Eigen::Matrix3Xd::Zero(3, places());
+}
+
+void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
+  evaluate(composed, x, fixed_places, y);
+  report.strain_violation = report.place_violation = 0;
+  report.worst_row = -1;
+  for (int r = 0; r < strains(); ++r) {
+    if (gram_diagonal[r] == 0) {
+      residual[r] = 0;
+      continue;
+    }
+    residual[r] = 0.5 * (y.col(r).squaredNorm() - 1);
+    if (!(std::abs(residual[r]) <= report.strain_violation)) {  // NaN counts as worst
+      report.strain_violation = std::abs(residual[r]);
+      report.worst_row = r;
+    }
+  }
+  for (int p = 0; p < places(); ++p) {
+    const Eigen::Vector3d gap = y.col(strains() + p) - targets.col(p);
+    residual.segment<3>(strains() + 3 * p) = gap;
+    if (!(gap.norm() <= report.place_violation)) report.place_violation = gap.norm();
+  }
+  report.converged =
+      report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
+}
+
+bool FastProjection::Impl::factorise() {
+  for (int r = 0; r < strains(); ++r) {
+    const double length = std::max(y.col(r).norm(), shortest_tangent);
+    scale[r] = gram_diagonal[r] > 0 ? 1 / (std::sqrt(gram_diagonal[r]) * length) : 0;
+    direction.col(r) = scale[r] * y.col(r);
+  }
+  for (int i = strains(); i < size(); ++i) {
+    scale[i] = 1 / std::sqrt(gram_diagonal[system_scalar[i]]);
+    direction.col(i) = scale[i] * Eigen::Vector3d::Unit((i - strains()) % 3);
+  }
+  const double* t = direction.data();
+  for (int c = 0; c < size(); ++c) {
+    const double t0 = t[3 * c], t1 = t[3 * c + 1], t2 = t[3 * c + 2];
+    for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
+      const double* s = t + 3 * pattern.row[e];
+      values[e] = gram[e] * (s[0] * t0 + s[1] * t1 + s[2] * t2);
+    }
+  }
+  // Strain rows may depend on each other (an edge between two pins); place rows may not, and get no softness unless the
+  // factor fails without it.
+  double strain_softness = options.regularisation, place_softness = 0;
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    for (int i = 0; i < size(); ++i)
+      values[pattern.column_start[i]] = 1 + (i < strains() ? strain_softness : place_softness);
+    if (factor->factorise(values)) return true;
+    strain_softness = std::max(10 * strain_softness, 1e-8);
+    place_softness = std::max(10 * place_softness, 1e-10);
+  }
+  return false;
+}
+
+void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
+  rhs = scale.cwiseProduct(residual);
+  factor->solve(rhs, solution);
+  double* places_of = x.data();
+  for (int i = 0; i < size(); ++i) {
+    const int r = system_scalar[i];
+    const double z = solution[i];
+    const double p0 = z * direction(0, i), p1 = z * direction(1, i), p2 = z * direction(2, i);
+    for (int e = composed.free.start[r]; e < composed.free.start[r + 1]; ++e) {
+      double* p = places_of + 3 * composed.free.column[e];
+      p[0] -= weight[e] * p0, p[1] -= weight[e] * p1, p[2] -= weight[e] * p2;
+    }
+  }
+  for (int r = 0; r < strains(); ++r) strain_lambda[r] += scale[r] * solution[r];
+  for (int i = strains(); i < size(); ++i)
+    place_lambda((i - strains()) % 3, (i - strains()) / 3) += scale[i] * solution[i];
+}
+
+FastProjection::FastProjection(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
+                               const ProjectionOptions& options)
+    : impl_(std::make_unique<Impl>(map, std::move(rows), options)) {
+  impl_->build(node_mass);
+}
+FastProjection::~FastProjection() = default;
+FastProjection::FastProjection(FastProjection&&) noexcept = default;
+FastProjection& FastProjection::operator=(FastProjection&&) noexcept = default;
+
+ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t) {
+  Impl& s = *impl_;
+  s.fixed_places = s.map.fixed_places(t);
+  for (int p = 0; p < s.places(); ++p) s.targets.col(p) = s.rows.place[p].target(t);
+  s.strain_lambda.setZero();
+  s.place_lambda.setZero();
+
+  ProjectionReport report;
+  double best = std::numeric_limits<double>::infinity();
+  int waited = 0;
+  while (true) {
+    s.measure(x, report);
+    if (s.size() == 0 || (report.converged && report.iterations >= s.options.min_iterations)) break;
+    if (report.iterations >= s.options.max_iterations) break;
+    const double excess = std::max(report.strain_violation / std::max(s.options.tolerance, 1e-30),
+                                   report.place_violation / std::max(s.options.place_tolerance, 1e-30));
+    if (!std::isfinite(excess)) break;
+    waited = excess < least_gain * best ? 0 : waited + 1;
+    best = std::min(best, excess);
+    if (waited >= patience) break;
+    if (!s.factorise()) break;
+    s.correct(x);
+    ++report.iterations;
+  }
+  return report;
+}
+
+const Eigen::VectorXd& FastProjection::strain_multipliers() const { return impl_->strain_lambda; }
+const Eigen::Matrix3Xd& FastProjection::place_multipliers() const { return impl_->place_lambda; }
+const ConstraintRows& FastProjection::rows() const { return impl_->rows; }
+const ProjectionOptions& FastProjection::options() const { return impl_->options; }
+std::size_t FastProjection::factor_nonzeros() const { return impl_->factor ? impl_->factor->factor_nonzeros() : 0; }
+
+}  // namespace toile
