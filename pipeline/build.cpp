@@ -1,0 +1,309 @@
+#include "pipeline/build.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "analysis/extension.h"
+#include "geometry/error.h"
+#include "geometry/measure.h"
+#include "geometry/refine.h"
+#include "pipeline/places.h"
+#include "trimming/quadrature.h"
+
+namespace toile {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+std::string face_names(const PanelFile& file) {
+  std::string names;
+  for (const TrimmedSurface& face : file.panels) names += (names.empty() ? "'" : ", '") + face.name + "'";
+  return names;
+}
+
+const TrimmedSurface* by_name(const PanelFile& file, const std::string& name) {
+  const auto it = std::ranges::find(file.panels, name, &TrimmedSurface::name);
+  return it == file.panels.end() ? nullptr : &*it;
+}
+
+// The face that a scene's panel means: by name, else by order.
+const TrimmedSurface& select_face(const PanelFile& file, const ScenePanel& panel) {
+  if (file.panels.empty()) throw InputError(fmt::format("{}: holds no face and no surface", file.path));
+  if (panel.named) {
+    if (const TrimmedSurface* face = by_name(file, panel.name)) return *face;
+    if (const TrimmedSurface* face = by_name(file, panel.name + std::string(flat_suffix))) return *face;
+    const bool anonymous = std::ranges::all_of(file.panels, [](const TrimmedSurface& f) { return f.name.empty(); });
+    if (file.panels.size() > 1 && !anonymous) {
+      throw InputError(fmt::format("{}: no face of {} is called '{}'; it has {}", panel.where, file.path, panel.name,
+                                   face_names(file)));
+    }
+  }
+  if (panel.order >= static_cast<int>(file.panels.size())) {
+    throw InputError(fmt::format("{}: panel '{}' would be face {} of {}, which has {}", panel.where, panel.name,
+                                 panel.order + 1, file.path, file.panels.size()));
+  }
+  return file.panels[static_cast<std::size_t>(panel.order)];
+}
+
+double box_size(const NurbsSurface& surface) { return bounding_box(surface).diagonal().norm(); }
+
+NurbsSurface placed(const NurbsSurface& surface, double metres_per_unit, const Placement& place) {
+  Eigen::Matrix3Xd points = place.rotation() * (metres_per_unit * surface.points());
+  points.colwise() += place.translate;
+  return surface.with_points(std::move(points));
+}
+
+void refuse_kinks(const NurbsSurface& surface, const std::string& who) {
+  for (const Direction d : {Direction::u, Direction::v}) {
+    const KnotVector& knots = surface.knots(d);
+    const char axis = d == Direction::u ? 'u' : 'v';
+    if (knots.degree() < 2) {
+      throw GeometryError(fmt::format("{}: degree {} in {} can't bend; give refine = {{ degree = 2 }}", who, knots.degree(),
+                                      axis));
+    }
+    const std::vector<double> breaks = knots.breaks();
+    for (std::size_t k = 1; k + 1 < breaks.size(); ++k) {
+      if (knots.multiplicity(breaks[k]) >= knots.degree()) {
+        throw GeometryError(fmt::format(
+            "{}: the surface has a kink along the knot line {} = {} (multiplicity {} at degree {}), which the shell can't "
+            "bend across; smooth it or split the panel there",
+            who, axis, breaks[k], knots.multiplicity(breaks[k]), knots.degree()));
+      }
+    }
+  }
+}
+
+// Surfaces at analysis resolution, unit of the file.
+NurbsSurface refined(const TrimmedSurface& source, const ScenePanel& panel, const std::string& who,
+                     std::vector<std::string>& warnings) {
+  NurbsSurface surface = source.surface;
+  if (!surface.u().clamped() || !surface.v().clamped()) {
+    surface = clamp(surface);
+    warnings.push_back(who + ": its knots were clamped");
+  }
+  if (!panel.start) {
+    RefineOptions options;
+    options.degree = panel.degree.value_or(2);
+    if (panel.span) options.span = *panel.span / source.metres_per_unit;
+    options.spans = panel.spans;
+    options.control_points = panel.control_points;
+    options.tolerance = std::max(source.resolution, 1e-9 * box_size(surface));
+    Refinement refinement;
+    try {
+      refinement = refine(surface, options);
+    } catch (const GeometryError& error) {
+      throw GeometryError(fmt::format("{}: {}", who, error.what()));
+    }
+    surface = std::move(refinement.surface);
+  }
+  refuse_kinks(surface, who);
+  return surface;
+}
+
+// Row sums of the mass matrix of a panel, SI.
+Eigen::VectorXd row_sums(const NurbsSurface& rest, const CutQuadrature& rule, double density) {
+  Eigen::VectorXd mass = Eigen::VectorXd::Zero(rest.points().cols());
+  SurfaceBasis basis;
+  for (std::size_t k = 0; k < rule.points.size(); ++k) {
+    evaluate_basis(rest, rule.points[k].x(), rule.points[k].y(), basis);
+    const SurfaceJet jet = evaluate(rest, rule.points[k].x(), rule.points[k].y());
+    const double m = rule.weights[k] * density * jet.u.cross(jet.v).norm();
+    for (int b = 0; b < basis.count_v; ++b) {
+      for (int a = 0; a < basis.count_u; ++a) {
+        mass[rest.index(basis.first_u + a, basis.first_v + b)] +=
+            m * basis.value[0][static_cast<std::size_t>(a + basis.count_u * b)];
+      }
+    }
+  }
+  return mass;
+}
+
+// 0.01 of the mass of the cell in which a control point's function is centred.
+Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density) {
+  constexpr double fraction = 0.01;
+  Eigen::VectorXd floor(rest.points().cols());
+  for (int j = 0; j < rest.count_v(); ++j) {
+    for (int i = 0; i < rest.count_u(); ++i) {
+      const double u = rest.u().greville(i), v = rest.v().greville(j);
+      const int su = rest.u().find_span(u), sv = rest.v().find_span(v);
+      const SurfaceJet jet = evaluate(rest, u, v);
+      const double area =
+          jet.u.cross(jet.v).norm() * (rest.u()[su + 1] - rest.u()[su]) * (rest.v()[sv + 1] - rest.v()[sv]);
+      floor[rest.index(i, j)] = fraction * density * area;
+    }
+  }
+  return floor;
+}
+
+NurbsSurface start_surface(const PanelFile& file, const ScenePanel& panel, const NurbsSurface& rest) {
+  const TrimmedSurface* face = by_name(file, *panel.start);
+  if (!face) {
+    throw InputError(fmt::format("{}: start: no face of {} is called '{}'; it has {}", panel.where, file.path, *panel.start,
+                                 face_names(file)));
+  }
+  if (panel.degree || panel.span || panel.spans || panel.control_points) {
+    throw InputError(panel.where + ": a panel with a start uses the file's own knots; leave refine out");
+  }
+  NurbsSurface start = face->surface;
+  if (!start.u().clamped() || !start.v().clamped()) start = clamp(start);
+  if (start.u() != rest.u() || start.v() != rest.v() || start.weights() != rest.weights()) {
+    throw InputError(fmt::format("{}: start: '{}' has other degrees, knots or weights than '{}'", panel.where, *panel.start,
+                                 panel.name));
+  }
+  return start;
+}
+
+struct PanelParts {
+  BuiltPanel built;
+  ShellPanel shell;
+  Eigen::Matrix3Xd start;
+  AffineMap::Matrix dependence;
+};
+
+PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vector<std::string>& warnings) {
+  const std::string who = fmt::format("{}: panel '{}'", panel.where, panel.name);
+  PanelParts parts;
+  BuiltPanel& built = parts.built;
+  built.name = panel.name;
+  built.source = select_face(file, panel);
+  built.face = built.source;
+  if (built.face.name.empty()) built.face.name = panel.name;
+  built.face.surface = refined(built.source, panel, who, warnings);
+  const double unit = built.face.metres_per_unit;
+  built.repairs = validate_loops(built.face);
+  for (const LoopRepair& repair : built.repairs) {
+    warnings.push_back(fmt::format("{}: loop {}: {}", who, repair.loop, repair.what));
+  }
+  built.topology = trace_trims(built.face);
+  CutQuadrature rule = quadrature(built.face, built.topology);
+  if (!(rule.area > 0)) throw GeometryError(who + ": the trim leaves no material");
+  built.points = constraint_points(built.face, built.topology);
+
+  const NurbsSurface rest = placed(built.face.surface, unit, panel.place);
+  Extension extension = extend(rest, rule, row_sums(rest, rule, panel.fabric.density));
+  built.carries_cloth = extension.carries_cloth;
+  built.extended = extension.extended;
+  built.extension_deviation = extension.deviation;
+  parts.dependence = std::move(extension.dependence);
+  parts.start = extension.rest.points();
+  if (panel.start) {
+    NurbsSurface start = start_surface(file, panel, built.face.surface);
+    parts.start = placed(start, unit, panel.place).points();
+  }
+  if (std::max(rest.u().degree(), rest.v().degree()) > 2) {
+    warnings.push_back(who + ": at degree 3 and above the strain is limited at knot-mesh points only, fewer than there are "
+                             "control points");
+  }
+  parts.shell = {panel.name, std::move(extension.rest), std::move(rule), panel.fabric, panel.grain};
+  return parts;
+}
+
+}  // namespace
+
+int Build::panel(const std::string& name) const {
+  for (std::size_t k = 0; k < panels.size(); ++k) {
+    if (panels[k].name == name) return static_cast<int>(k);
+  }
+  throw InputError(fmt::format("no panel is called '{}'", name));
+}
+
+Eigen::Matrix3Xd Build::net(int panel, const Eigen::VectorXd& q) const {
+  const Eigen::Index count = rest(panel).points().cols();
+  return q.segment(3 * model->first_control_point(panel), 3 * count).reshaped(3, count);
+}
+
+Build build(Scene scene) {
+  Build result;
+  result.scene = std::move(scene);
+  const Clock::time_point reading = Clock::now();
+  std::vector<std::size_t> file_of;
+  for (const ScenePanel& panel : result.scene.panels) {
+    const std::string path = panel.file.string();
+    auto it = std::ranges::find(result.files, path, &PanelFile::path);
+    if (it == result.files.end()) {
+      result.files.push_back(read_iges(panel.file));
+      result.files.back().path = path;
+      for (const std::string& warning : result.files.back().warnings) result.warnings.push_back(warning);
+      it = result.files.end() - 1;
+    }
+    file_of.push_back(static_cast<std::size_t>(it - result.files.begin()));
+  }
+  result.read_seconds = since(reading);
+
+  const Clock::time_point trimming = Clock::now();
+  std::vector<ShellPanel> shells;
+  std::vector<Eigen::Triplet<double>> dependence;
+  std::vector<Eigen::Matrix3Xd> starts;
+  int count = 0;
+  for (std::size_t k = 0; k < file_of.size(); ++k) {
+    PanelParts parts = build_panel(result.files[file_of[k]], result.scene.panels[k], result.warnings);
+    for (int row = 0; row < parts.dependence.outerSize(); ++row) {
+      for (AffineMap::Matrix::InnerIterator it(parts.dependence, row); it; ++it) {
+        dependence.emplace_back(count + static_cast<int>(it.row()), count + static_cast<int>(it.col()), it.value());
+      }
+    }
+    count += static_cast<int>(parts.start.cols());
+    starts.push_back(std::move(parts.start));
+    shells.push_back(std::move(parts.shell));
+    result.panels.push_back(std::move(parts.built));
+  }
+  result.dependence.resize(count, count);
+  result.dependence.setFromTriplets(dependence.begin(), dependence.end());
+  result.model = std::make_unique<ShellModel>(std::move(shells));
+  result.trim_seconds = since(trimming);
+
+  result.start.resize(3 * count);
+  result.mass_floor.resize(count);
+  for (std::size_t k = 0; k < starts.size(); ++k) {
+    const int first = result.model->first_control_point(static_cast<int>(k));
+    result.start.segment(3 * first, starts[k].size()) = starts[k].reshaped();
+    const ShellPanel& panel = result.model->panels()[k];
+    result.mass_floor.segment(first, starts[k].cols()) = mass_floor(panel.rest, panel.fabric.density);
+  }
+  // A start from a file satisfies the dependence to rounding only where that file came from the same panel.
+  const AffineMap free(result.dependence, {}, {});
+  const Eigen::VectorXd nodes = free.restrict(result.start);
+  free.expand(nodes, 0, result.start);
+
+  Loads& loads = result.loads;
+  loads.wind = result.scene.wind;
+  loads.force.resize(3 * count);
+  for (int i = 0; i < count; ++i) {
+    loads.force.segment<3>(3 * i) = result.model->lumped_mass()[i] * result.scene.gravity;
+  }
+  for (std::size_t t = 0; t < result.scene.tractions.size(); ++t) {
+    const SceneTraction& traction = result.scene.tractions[t];
+    const int k = result.panel(traction.panel);
+    const BuiltPanel& panel = result.panels[static_cast<std::size_t>(k)];
+    const Eigen::Matrix3Xd start = result.net(k, result.start);
+    const NurbsSurface& rest = result.rest(k);
+    const std::string who = fmt::format("{}: traction {} ({})", traction.where, t, traction.along.text);
+    const PanelPlaces places{panel.name, panel.face, panel.topology, rest, start, panel.carries_cloth};
+    const int first = result.model->first_control_point(k);
+    SurfaceBasis basis;
+    for (const LinePoint& point : line_points(traction.along, places, who)) {
+      evaluate_basis(rest, point.uv.x(), point.uv.y(), basis);
+      for (int b = 0; b < basis.count_v; ++b) {
+        for (int a = 0; a < basis.count_u; ++a) {
+          const int i = first + rest.index(basis.first_u + a, basis.first_v + b);
+          loads.force.segment<3>(3 * i) +=
+              point.weight * basis.value[0][static_cast<std::size_t>(a + basis.count_u * b)] * traction.force;
+        }
+      }
+    }
+  }
+  for (const OutputPoint& point : result.scene.points) {
+    const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(point.panel))];
+    if (!contains(panel.face, panel.topology, point.uv)) {
+      throw GeometryError(fmt::format("{}: output point ({}, {}) is not in the material of panel '{}'", point.where,
+                                      point.uv.x(), point.uv.y(), panel.name));
+    }
+  }
+  return result;
+}
+
+}  // namespace toile

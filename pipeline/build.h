@@ -1,0 +1,59 @@
+// Building a run from a scene: files read, panels refined, trims traced, model and loads made.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/affine_map.h"
+#include "analysis/dynamics/verlet.h"
+#include "analysis/shell/shell_model.h"
+#include "geometry/trimmed_surface.h"
+#include "io/iges.h"
+#include "pipeline/scene.h"
+#include "trimming/constraint_points.h"
+#include "trimming/loops.h"
+#include "trimming/topology.h"
+
+namespace toile {
+
+// One panel, ready. `source` has the file's own numbers and trims; `face` the refined surface and valid loops, both in
+// the file's unit. Control points of `face`, of the model and of the output are the same ones, in the same order.
+struct BuiltPanel {
+  std::string name;
+  TrimmedSurface source;
+  TrimmedSurface face;
+  TrimTopology topology;
+  std::vector<ConstraintPoint> points;
+  std::vector<LoopRepair> repairs;
+  std::vector<bool> carries_cloth;  // per control point
+  std::vector<int> extended;        // control points with too little cloth that follow their neighbours
+  double extension_deviation = 0;   // m, of the rest surface inside the material
+};
+
+// Everything of a run that doesn't change with pins being released.
+//   (1) start satisfies `dependence`; (2) model control points are those of the panels in order.
+struct Build {
+  Scene scene;
+  std::vector<PanelFile> files;
+  std::vector<BuiltPanel> panels;
+  std::unique_ptr<ShellModel> model;
+  AffineMap::Matrix dependence;      // of all control points
+  Eigen::VectorXd start;             // 3 n [m]
+  Eigen::VectorXd mass_floor;        // n [kg]: 0.01 of density times cell area (design.md, "Small cut cells")
+  Loads loads;
+  std::vector<std::string> warnings;
+  double read_seconds = 0, trim_seconds = 0;
+
+  int panel(const std::string& name) const;  // by the scene's name; must exist
+  // The rest of a panel, SI, scene axes: what the model calls unstrained.
+  const NurbsSurface& rest(int panel) const { return model->panels()[static_cast<std::size_t>(panel)].rest; }
+  // A panel's net out of the control points of all panels [m].
+  Eigen::Matrix3Xd net(int panel, const Eigen::VectorXd& q) const;
+};
+
+// Throws InputError (files, names), GeometryError (panel, loop, place; pin or traction on a trimmed-away place).
+Build build(Scene scene);
+
+}  // namespace toile

@@ -1,0 +1,228 @@
+#include "pipeline/system.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "analysis/projection/select_rows.h"
+#include "geometry/error.h"
+#include "pipeline/places.h"
+
+namespace toile {
+namespace {
+
+// Rows of a curve pin depend on each other; below this part of a row's own size it adds nothing that others don't hold.
+constexpr double smallest_place_pivot = 1e-3;
+
+ScalarRow row_at(const Build& build, int panel, const Eigen::Vector2d& uv) {
+  const NurbsSurface& rest = build.rest(panel);
+  const int first = build.model->first_control_point(panel);
+  SurfaceBasis basis;
+  evaluate_basis(rest, uv.x(), uv.y(), basis);
+  ScalarRow row;
+  for (int b = 0; b < basis.count_v; ++b) {
+    for (int a = 0; a < basis.count_u; ++a) {
+      const double value = basis.value[0][static_cast<std::size_t>(a + basis.count_u * b)];
+      if (value == 0) continue;
+      row.index.push_back(first + rest.index(basis.first_u + a, basis.first_v + b));
+      row.value.push_back(value);
+    }
+  }
+  return row;
+}
+
+Eigen::Vector3d apply(const ScalarRow& row, const Eigen::VectorXd& q) {
+  Eigen::Vector3d y = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * q.segment<3>(3 * row.index[k]);
+  return y;
+}
+
+struct Candidate {
+  ScalarRow row;
+  int pin = 0;
+  bool required = false;
+};
+
+// Which candidates are independent of those before them and of the fixed control points: Cholesky of the rows' inertia
+// N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one left.
+std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map, const Eigen::VectorXd& mass) {
+  const int n = static_cast<int>(candidates.size());
+  Eigen::SparseMatrix<double, Eigen::RowMajor> rows(n, map.control_points());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int k = 0; k < n; ++k) {
+    const ScalarRow& row = candidates[static_cast<std::size_t>(k)].row;
+    for (std::size_t a = 0; a < row.index.size(); ++a) entries.emplace_back(k, row.index[a], row.value[a]);
+  }
+  rows.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> reduced = rows * map.free_part();
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> scaled = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
+  Eigen::MatrixXd dense = Eigen::MatrixXd(scaled);
+  std::vector<bool> taken(static_cast<std::size_t>(n), false);
+  Eigen::VectorXd left(n);
+  for (int k = 0; k < n; ++k) {
+    const double norm = dense.row(k).norm();
+    // A row that touches fixed control points only holds nothing new.
+    left[k] = norm > 1e-9 / std::sqrt(mass.maxCoeff()) ? 1 : 0;
+    if (left[k] > 0) dense.row(k) /= norm;
+  }
+  // Gram-Schmidt on the rows is the Cholesky factorisation of their Gram matrix.
+  for (bool required : {true, false}) {
+    while (true) {
+      int best = -1;
+      for (int k = 0; k < n; ++k) {
+        const auto& c = candidates[static_cast<std::size_t>(k)];
+        if (taken[static_cast<std::size_t>(k)] || c.required != required || left[k] < smallest_place_pivot) continue;
+        if (best < 0 || (!required && left[k] > left[best] * (1 + 1e-9))) best = k;
+      }
+      if (best < 0) break;
+      taken[static_cast<std::size_t>(best)] = true;
+      const Eigen::RowVectorXd q = dense.row(best).normalized();
+      for (int k = 0; k < n; ++k) {
+        if (taken[static_cast<std::size_t>(k)] || left[k] == 0) continue;
+        dense.row(k) -= dense.row(k).dot(q) * q;
+        left[k] = dense.row(k).squaredNorm();
+      }
+    }
+  }
+  return taken;
+}
+
+}  // namespace
+
+std::unique_ptr<System> assemble(const Build& build, double t) {
+  const Scene& scene = build.scene;
+  auto system = std::make_unique<System>();
+
+  // What each pin holds.
+  struct Held {
+    int control_point;
+    int pin;
+  };
+  std::vector<Held> held;
+  std::vector<Candidate> candidates;
+  std::vector<Eigen::Vector3d> mean(scene.pins.size(), Eigen::Vector3d::Zero());
+  for (std::size_t p = 0; p < scene.pins.size(); ++p) {
+    const ScenePin& pin = scene.pins[p];
+    if (pin.release && *pin.release <= t) continue;
+    const int k = build.panel(pin.panel);
+    const BuiltPanel& panel = build.panels[static_cast<std::size_t>(k)];
+    const Eigen::Matrix3Xd start = build.net(k, build.start);
+    const std::string who = fmt::format("{}: pin {} ({})", pin.where, p, pin.at.text);
+    const PanelPlaces places{panel.name, panel.face, panel.topology, build.rest(k), start, panel.carries_cloth};
+    const HeldPlace place = held_place(pin.at, pin.clamp, places, who);
+    int points = 0;
+    for (const int i : place.control_points) {
+      held.push_back({build.model->first_control_point(k) + i, static_cast<int>(p)});
+      mean[p] += start.col(i);
+      ++points;
+    }
+    for (const Eigen::Vector2d& uv : place.points) {
+      candidates.push_back({row_at(build, k, uv), static_cast<int>(p), place.every_point});
+      mean[p] += apply(candidates.back().row, build.start);
+      ++points;
+    }
+    mean[p] /= points;
+  }
+  std::ranges::stable_sort(held, {}, &Held::control_point);
+  std::vector<Held> fixed;
+  for (const Held& h : held) {
+    if (!fixed.empty() && fixed.back().control_point == h.control_point) {
+      const ScenePin& a = scene.pins[static_cast<std::size_t>(fixed.back().pin)];
+      const ScenePin& b = scene.pins[static_cast<std::size_t>(h.pin)];
+      if (a.move || b.move) {
+        throw InputError(fmt::format("{}: pins {} ({}) and {} ({}) hold the same control point and one of them moves",
+                                     b.where, fixed.back().pin, a.at.text, h.pin, b.at.text));
+      }
+      continue;
+    }
+    fixed.push_back(h);
+  }
+
+  const auto moved = [&scene, mean](int pin, const Eigen::Vector3d& from, double time) -> Eigen::Vector3d {
+    const auto& move = scene.pins[static_cast<std::size_t>(pin)].move;
+    return move ? (*move)(from, mean[static_cast<std::size_t>(pin)], time) : from;
+  };
+  std::vector<int> control_points;
+  std::vector<Eigen::Vector3d> places;
+  for (const Held& h : fixed) {
+    control_points.push_back(h.control_point);
+    places.push_back(build.start.segment<3>(3 * h.control_point));
+    system->fixed_pin.push_back(h.pin);
+  }
+  system->map = std::make_unique<AffineMap>(
+      build.dependence, control_points,
+      [moved, places, pins = system->fixed_pin](std::size_t i, double time) { return moved(pins[i], places[i], time); });
+
+  DynamicSystem& dynamic = system->dynamic;
+  dynamic.model = build.model.get();
+  dynamic.map = system->map.get();
+  dynamic.loads = build.loads;
+  dynamic.node_mass = system->map->reduce_scalar(build.model->lumped_mass());
+  dynamic.node_drag = system->map->reduce_scalar(build.model->lumped_drag());
+  const auto& nodes = system->map->node_control_point();
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    double& mass = dynamic.node_mass[static_cast<Eigen::Index>(k)];
+    mass = std::max(mass, build.mass_floor[nodes[k]]);
+    double& drag = dynamic.node_drag[static_cast<Eigen::Index>(k)];
+    drag = std::max(drag, 0.0);
+  }
+
+  ConstraintRows rows;
+  const std::vector<bool> taken = independent(candidates, *system->map, dynamic.node_mass);
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    Candidate& c = candidates[k];
+    if (!taken[k]) continue;
+    const Eigen::Vector3d from = apply(c.row, build.start);
+    const int pin = c.pin;
+    rows.place.push_back({std::move(c.row), pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
+    system->place_pin.push_back(pin);
+  }
+  for (const BuiltPanel& panel : build.panels) system->points.push_back(panel.points);
+  if (scene.strain_limit.on) {
+    rows.strain = select_rows(*build.model, *system->map, dynamic.node_mass, system->points, rows.place);
+  }
+  system->strain_rows = static_cast<int>(rows.strain.size());
+  system->place_rows = static_cast<int>(rows.place.size());
+  if (!rows.strain.empty() || !rows.place.empty()) {
+    ProjectionOptions options;
+    options.tolerance = scene.strain_limit.tolerance;
+    options.regularisation = scene.strain_limit.regularisation;
+    options.max_iterations = scene.strain_limit.max_iterations;
+    system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
+  }
+  dynamic.projection = system->projection.get();
+  return system;
+}
+
+Eigen::VectorXd control_points(const System& system, const DynamicState& state) {
+  Eigen::VectorXd q(3 * system.map->control_points());
+  system.map->expand(state.x, state.t, q);
+  return q;
+}
+
+Eigen::VectorXd control_point_velocity(const System& system, const DynamicState& state) {
+  // q = T x + g(t): T v by expanding a step of x, g' by a central difference of the motion, which is smooth.
+  constexpr double h = 1e-5;
+  Eigen::VectorXd later(3 * system.map->control_points()), earlier(later.size());
+  system.map->expand(state.v, state.t, later);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(state.v.size());
+  system.map->expand(zero, state.t, earlier);
+  Eigen::VectorXd velocity = later - earlier;
+  system.map->expand(zero, state.t + h, later);
+  system.map->expand(zero, state.t - h, earlier);
+  velocity += (later - earlier) / (2 * h);
+  return velocity;
+}
+
+DynamicState state_from(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double t) {
+  DynamicState state;
+  state.t = t;
+  state.x = system.map->restrict(q);
+  state.v = system.map->restrict(v);
+  initialise(system.dynamic, state);
+  return state;
+}
+
+}  // namespace toile

@@ -1,0 +1,38 @@
+// The system that the step loop advances: a build with the pins that hold at some time.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "pipeline/build.h"
+
+namespace toile {
+
+// Pins, projection, masses. `dynamic` points into the rest, so a System stays where it is made.
+struct System {
+  System() = default;
+  System(const System&) = delete;
+
+  std::vector<int> fixed_pin;                             // pin of each fixed control point, in map order
+  std::vector<std::vector<ConstraintPoint>> points;       // per panel: which the projection takes, and why not
+  int strain_rows = 0, place_rows = 0;
+  std::vector<int> place_pin;                             // pin of each place row
+  std::unique_ptr<AffineMap> map;
+  std::unique_ptr<FastProjection> projection;             // null: nothing to project
+  DynamicSystem dynamic;
+};
+
+// Pins released at or before t are left out. Throws InputError where two pins hold one control point and move apart,
+// GeometryError for places that don't exist, SolverError where place rows contradict each other.
+std::unique_ptr<System> assemble(const Build& build, double t);
+
+// State that continues control points q with velocities v (3 n each) under this system at time t.
+DynamicState state_from(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double t);
+
+// Velocities of all control points [m/s], those of moved pins included.
+Eigen::VectorXd control_point_velocity(const System& system, const DynamicState& state);
+Eigen::VectorXd control_points(const System& system, const DynamicState& state);
+
+}  // namespace toile
