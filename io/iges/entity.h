@@ -1,0 +1,114 @@
+// Entities one by one: each family has a file with its reader and its writer side by side; the table below names them.
+// To add one: a file in this folder, a row in table.cpp, a file in tests/corpus/iges.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/nurbs_curve.h"
+#include "geometry/nurbs_surface.h"
+#include "io/iges/parameters.h"
+
+namespace toile::iges {
+
+// Readers stop after the entity's own parameters: what follows are pointers to associativities and properties.
+// They refuse (InputError) counts that the record doesn't hold before they allocate for them.
+
+// 126: knots, weights and points as they stand; `range` is the part of the domain that is meant.
+struct SplineCurve {
+  Curve3 curve;
+  Interval range;
+};
+SplineCurve read_spline_curve(Parameters& in);
+void write(const SplineCurve& curve, Record& out);
+
+// 128, alike.
+struct SplineSurface {
+  NurbsSurface surface;
+  Interval u, v;
+};
+SplineSurface read_spline_surface(Parameters& in);
+void write(const SplineSurface& surface, Record& out);
+// The part of the surface over the ranges, its domain being exactly those.
+NurbsSurface restricted(const SplineSurface& surface);
+
+// 100: an arc in the plane z = height, counter-clockwise from start to end; equal ends mean the full circle.
+struct Arc {
+  double height = 0;
+  Eigen::Vector2d centre{0, 0}, start{0, 0}, end{0, 0};
+};
+Arc read_arc(Parameters& in);
+void write(const Arc& arc, Record& out);
+Curve3 to_curve(const Arc& arc);
+
+// 110
+struct Segment {
+  Eigen::Vector3d start{0, 0, 0}, end{0, 0, 0};
+};
+Segment read_segment(Parameters& in);
+void write(const Segment& segment, Record& out);
+
+// 106 as a polyline (forms 11, 12, 13 and 63; vectors of form 13 are kept for writing, not used).
+struct CopiousData {
+  int kind = 1;        // 1: x, y in the plane z = height; 2: x, y, z; 3: with vectors
+  double height = 0;
+  std::vector<double> numbers;  // 2, 3 or 6 a point
+};
+CopiousData read_copious(Parameters& in);
+void write(const CopiousData& data, Record& out);
+Curve3 to_curve(const CopiousData& data);
+
+// 102: directory numbers of its curves, in order.
+std::vector<int> read_composite(Parameters& in);
+void write_composite(const std::vector<int>& curves, Record& out);
+
+// 124: x -> R x + t
+Eigen::Affine3d read_transform(Parameters& in);
+void write(const Eigen::Affine3d& transform, Record& out);
+
+// 142
+struct Boundary {
+  int creation = 0;
+  int surface = 0, parameter_curve = 0, model_curve = 0;  // directory numbers, 0 for none
+  int preference = 0;                                     // 1 parameter curve, 2 model curve, 3 either, 0 unsaid
+};
+Boundary read_boundary(Parameters& in);
+void write(const Boundary& boundary, Record& out);
+
+// 144. An outer pointer counts even where the file says that the outer boundary is the domain's (N1 = 0).
+struct Face {
+  int surface = 0;
+  int outer = 0;  // 0: the border of the surface's domain
+  bool outer_was_denied = false;
+  std::vector<int> holes;
+};
+Face read_face(Parameters& in);
+void write(const Face& face, Record& out);
+
+// 314: red, green, blue in percent, and a name.
+struct Colour {
+  double red = 0, green = 0, blue = 0;
+  std::string name;
+};
+Colour read_colour(Parameters& in);
+void write(const Colour& colour, Record& out);
+
+// 406 form 15; nullopt for other forms.
+std::optional<std::string> read_name(Parameters& in);
+void write_name(const std::string& name, Record& out);
+
+// What the dispatch table knows of an entity type.
+struct Kind {
+  int type;
+  const char* name;
+  // Reads the entity's own parameters and writes them anew; false: this form is only ever replayed. Null: never.
+  bool (*rewrite)(Parameters& in, Record& out);
+  // The entity as a NURBS curve in its own definition space (its 124 not applied); null for what isn't one curve.
+  Curve3 (*curve)(Parameters& in);
+  bool converted;  // the curve is another representation of what the record says
+};
+const Kind* find_kind(int type);
+
+}  // namespace toile::iges

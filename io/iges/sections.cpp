@@ -1,0 +1,413 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "geometry/error.h"
+#include "io/iges/file.h"
+#include "io/iges/parameters.h"
+
+namespace toile::iges {
+
+namespace {
+
+constexpr std::size_t section_column = 72;  // 0-based column of the section letter
+
+bool is_blank(char c) { return static_cast<unsigned char>(c) <= ' '; }
+bool is_digit(char c) { return '0' <= c && c <= '9'; }
+bool is_section(char c) { return c == 'S' || c == 'G' || c == 'D' || c == 'P' || c == 'T'; }
+
+std::string_view trim(std::string_view s) {
+  while (!s.empty() && is_blank(s.front())) s.remove_prefix(1);
+  while (!s.empty() && is_blank(s.back())) s.remove_suffix(1);
+  return s;
+}
+
+std::string printable(std::string_view s, std::size_t most = 30) {
+  std::string shown;
+  for (char c : s.substr(0, most)) shown += 32 <= c && c < 127 ? c : '?';
+  return shown;
+}
+
+struct Line {
+  std::string_view data;  // what stands before the section letter
+  char section = 0;       // 0: none found
+  bool aligned = true;
+};
+
+Line classify(std::string_view line) {
+  while (!line.empty() && is_blank(line.back())) line.remove_suffix(1);
+  if (line.size() > section_column && is_section(line[section_column])) {
+    const std::string_view number = line.substr(section_column + 1, 7);
+    if (std::all_of(number.begin(), number.end(), [](char c) { return is_digit(c) || c == ' '; }))
+      return {line.substr(0, section_column), line[section_column], true};
+  }
+  // Elsewhere: a letter followed by up to seven digits (blank-padded) at the end of the line.
+  std::size_t i = line.size();
+  while (i > 0 && is_digit(line[i - 1])) --i;
+  const bool numbered = i < line.size();
+  while (i > 0 && line[i - 1] == ' ' && line.size() - i < 7) --i;
+  if (numbered && i > 0 && is_section(line[i - 1]) && line.size() - i <= 7)
+    return {line.substr(0, i - 1), line[i - 1], false};
+  return {line, 0, false};
+}
+
+// Calls visit(line, number) for every line: ended by CR, LF or both, or 80 columns each where there are no line ends.
+template <class Visit>
+void for_each_line(std::string_view text, Visit&& visit) {
+  int number = 0;
+  std::size_t i = 0;
+  while (i < text.size()) {
+    if (text[i] == '\x1A') return;
+    std::size_t end = text.find_first_of("\r\n", i);
+    if (end == std::string_view::npos) end = text.size();
+    std::string_view line = text.substr(i, end - i);
+    while (line.size() > 80 + section_column && is_section(line[section_column]) && is_section(line[80 + section_column])) {
+      if (!visit(line.substr(0, 80), ++number)) return;
+      line.remove_prefix(80);
+    }
+    if (!visit(line, ++number)) return;
+    i = end + 1;
+    if (end + 1 < text.size() && text[end] == '\r' && text[end + 1] == '\n') ++i;
+  }
+}
+
+std::string_view field(std::string_view card, std::size_t index) {
+  return card.size() > 8 * index ? trim(card.substr(8 * index, 8)) : std::string_view();
+}
+
+int integer_field(std::string_view card, std::size_t index) {
+  const std::string_view text = field(card, index);
+  return text.empty() ? 0 : parse_integer(text).value_or(0);
+}
+
+Entry read_entry(std::string_view first, std::string_view second, int line, int sequence) {
+  Entry entry;
+  entry.sequence = sequence;
+  entry.line = line;
+  entry.cards = {first, second};
+  entry.type = parse_integer(field(first, 0)).value_or(integer_field(second, 0));
+  entry.first = integer_field(first, 1);  // as the file says, from 1; resolved later
+  entry.count = integer_field(second, 3);
+  entry.level = integer_field(first, 4);
+  entry.transform = integer_field(first, 6);
+  std::string status(first.size() > 64 ? first.substr(64, 8) : std::string_view());
+  if (status.size() == 8 && (is_digit(status[3]) || is_digit(status[2])))
+    entry.subordinate = (is_digit(status[2]) ? status[2] - '0' : 0) * 10 + (is_digit(status[3]) ? status[3] - '0' : 0);
+  entry.colour = integer_field(second, 2);
+  entry.form = integer_field(second, 4);
+  entry.label = field(second, 7);
+  const std::string_view subscript = field(second, 8);
+  if (!entry.label.empty() && !subscript.empty() && subscript != "0") entry.label += subscript;
+  return entry;
+}
+
+void read_global(File& file, std::string_view text) {
+  std::size_t i = 0;
+  auto skip_blanks = [&] {
+    while (i < text.size() && is_blank(text[i])) ++i;
+  };
+  auto delimiter = [&](char otherwise) {
+    skip_blanks();
+    if (i + 2 < text.size() && text[i] == '1' && (text[i + 1] == 'H' || text[i + 1] == 'h')) {
+      const char c = text[i + 2];
+      i += 3;
+      if (is_blank(c) || is_digit(c) || std::string_view("+-.DEHdeh").find(c) != std::string_view::npos)
+        throw InputError(file.name + ":" + std::to_string(file.global_line) + ": global section: the delimiter is '" +
+                         printable({&c, 1}) + "', must be none of digits, blanks, + - . D E H");
+      return c;
+    }
+    return otherwise;
+  };
+  Delimiters& d = file.delimiters;
+  d.parameter = delimiter(',');
+  skip_blanks();
+  if (i < text.size() && text[i] == d.parameter) ++i;
+  d.record = delimiter(';');
+  skip_blanks();
+  bool ended = i < text.size() && text[i] == d.record;
+  if (i < text.size() && text[i] == d.parameter) ++i;
+  if (d.parameter == d.record)
+    throw InputError(file.name + ":" + std::to_string(file.global_line) +
+                     ": global section: parameter and record delimiter are the same");
+  Tokens tokens;
+  if (!ended) {
+    tokenize(text.substr(std::min(i, text.size())), d, tokens);
+    if (!tokens.terminated) file.notes.add("global end", file.name + ":" + std::to_string(file.global_line) + ": global section: no record delimiter at its end");
+    if (tokens.wrong_count) file.notes.add("global hollerith", file.name + ":" + std::to_string(file.global_line) + ": global section: a string count is wrong");
+  }
+  Global& g = file.global;
+  for (const Token& t : tokens.list) {
+    g.fields.emplace_back(t.text);
+    g.is_text.push_back(t.is_string);
+  }
+  auto at = [&](std::size_t number) {  // by the standard's numbers, 3 to 26
+    return number - 3 < g.fields.size() ? std::string(trim(g.fields[number - 3])) : std::string();
+  };
+  auto note = [&](const std::string& what) {
+    file.notes.add(what, file.name + ":" + std::to_string(file.global_line) + ": global section: " + what);
+  };
+  g.product = at(3);
+  g.system = at(5);
+  g.preprocessor = at(6);
+  if (const std::string scale = at(13); !scale.empty()) {
+    const std::optional<double> value = parse_real(scale);
+    if (value && *value > 0) {
+      g.scale = *value;
+    } else {
+      note("model scale is '" + printable(scale) + "', must be positive; 1 taken");
+    }
+  }
+  const std::string flag = at(14), name = at(15);
+  g.unit_flag = flag.empty() ? 0 : parse_integer(flag).value_or(-1);
+  std::optional<Unit> by_name = unit_of_name(name);
+  std::optional<Unit> unit = unit_of_flag(g.unit_flag);
+  if (unit) {
+    g.unit = name.empty() ? unit->name : name;
+    if (by_name && by_name->flag != unit->flag)
+      note("unit flag " + flag + " and unit name '" + printable(name) + "' disagree; the flag is taken");
+    if (!by_name) g.unit = unit->name;
+  } else {
+    unit = by_name;
+    if (!unit) {
+      unit = unit_of_flag(1);
+      note(flag.empty() && name.empty() ? "no unit given; inches taken, as the standard says"
+                                        : "unit flag '" + printable(flag) + "' and unit name '" + printable(name) +
+                                              "' are not known; inches taken");
+    } else if (g.unit_flag != 3) {
+      note("unit flag '" + printable(flag) + "' is not known; the unit name '" + printable(name) + "' is taken");
+    }
+    g.unit = unit->name;
+    g.unit_flag = unit->flag;
+  }
+  g.metres_per_unit = unit->metres / g.scale;
+  if (const std::string resolution = at(19); !resolution.empty()) {
+    const std::optional<double> value = parse_real(resolution);
+    if (value && *value >= 0) {
+      g.resolution = *value;
+    } else {
+      note("resolution is '" + printable(resolution) + "', must not be negative; 0 taken");
+    }
+  }
+}
+
+// Parameter lines of every entry: from its pointer as long as the lines carry its number; where the pointer leads
+// elsewhere, the first line that carries its number; where lines carry no numbers, as many as the directory says.
+void resolve_records(File& file) {
+  const auto& lines = file.parameter_lines;
+  const int total = static_cast<int>(lines.size());
+  std::map<int, int> first_of_owner;
+  bool mapped = false;
+  for (Entry& entry : file.entries) {
+    int first = entry.first - 1;
+    const int claimed = entry.count;
+    auto owner = [&](int i) { return lines[static_cast<std::size_t>(i)].owner; };
+    const bool in_range = 0 <= first && first < total;
+    if (!in_range || owner(first) != entry.sequence || (first > 0 && owner(first - 1) == entry.sequence)) {
+      if (!mapped) {
+        mapped = true;
+        for (int i = total - 1; i >= 0; --i) first_of_owner[owner(i)] = i;
+      }
+      const auto found = first_of_owner.find(entry.sequence);
+      if (found != first_of_owner.end()) {
+        first = found->second;
+        file.notes.add("parameter pointer", file.place(entry) + "its parameter pointer is wrong; the lines marked with its number are taken");
+      } else if (!in_range || owner(first) != 0) {
+        first = -1;
+      }
+    }
+    if (first < 0) {
+      entry.first = entry.count = 0;
+      continue;
+    }
+    int end = first;
+    while (end < total && owner(end) == entry.sequence) ++end;
+    if (end == first) end = static_cast<int>(std::min<long long>(total, first + std::max(1LL, static_cast<long long>(claimed))));
+    entry.first = first;
+    entry.count = end - first;
+    if (entry.count != claimed)
+      file.notes.add("line count", file.place(entry) + "claims " + std::to_string(claimed) + " parameter lines, has " +
+                                       std::to_string(entry.count));
+  }
+}
+
+}  // namespace
+
+void Notes::add(const std::string& kind, std::string message) {
+  for (Note& note : notes_)
+    if (note.kind == kind) {
+      ++note.count;
+      return;
+    }
+  notes_.push_back({kind, std::move(message), 1});
+}
+
+std::vector<std::string> Notes::list() const {
+  std::vector<std::string> out;
+  for (const Note& note : notes_)
+    out.push_back(note.count == 1 ? note.message : note.message + " (" + std::to_string(note.count) + " times)");
+  return out;
+}
+
+const Entry* File::find(int sequence) const {
+  if (sequence < 1 || sequence % 2 == 0) return nullptr;
+  const auto i = static_cast<std::size_t>((sequence - 1) / 2);
+  return i < entries.size() ? &entries[i] : nullptr;
+}
+
+std::string_view File::record(const Entry& entry) const {
+  if (entry.count == 0) return {};
+  const std::size_t begin = parameter_lines[static_cast<std::size_t>(entry.first)].begin;
+  const auto last = static_cast<std::size_t>(entry.first + entry.count);
+  const std::size_t end = last < parameter_lines.size() ? parameter_lines[last].begin : parameters.size();
+  return std::string_view(parameters).substr(begin, end - begin);
+}
+
+std::string File::place(const Entry& entry, int line) const {
+  return name + ":" + std::to_string(line > 0 ? line : entry.line) + ": entity " + std::to_string(entry.type) + ": ";
+}
+
+std::shared_ptr<const File> parse_file(std::string_view text, const std::string& name) {
+  auto result = std::make_shared<File>();
+  File& file = *result;
+  file.name = name;
+  file.text = text;
+  if (trim(text).empty()) throw InputError(name + ": the file is empty, must be IGES");
+
+  std::string global;
+  struct Card {
+    std::string_view data;
+    int line;
+  };
+  std::vector<Card> directory;
+  std::string_view terminate;
+  int sections = 0, last_line = 0, global_lines = 0;
+  std::array<int, 4> counts{};  // S, G, D, P
+  file.parameters.reserve(text.size());
+  auto note = [&](const std::string& kind, int line, const std::string& what) {
+    file.notes.add(kind, name + ":" + std::to_string(line) + ": " + what);
+  };
+  for_each_line(file.text, [&](std::string_view raw, int number) {
+    if (file.terminated) {
+      if (!trim(raw).empty()) note("after T", number, "text after the terminate line is ignored");
+      return true;
+    }
+    if (trim(raw).empty()) return true;
+    last_line = number;
+    if (sections == 0 && raw.size() > section_column && (raw[section_column] == 'C' || raw[section_column] == 'B') &&
+        raw.size() <= 80 && trim(raw.substr(section_column + 1)).find_first_not_of("0123456789") == std::string_view::npos)
+      throw InputError(name + ":" + std::to_string(number) + ": " + (raw[section_column] == 'C' ? "compressed" : "binary") +
+                       " IGES is not read, must be fixed-length ASCII");
+    const Line line = classify(raw);
+    if (line.section == 0) {
+      note("no section", number, "no section letter in column 73; the line is ignored");
+      return true;
+    }
+    ++sections;
+    if (!line.aligned) note("misaligned", number, "the section letter does not stand in column 73");
+    switch (line.section) {
+      case 'S':
+        ++counts[0];
+        file.start.push_back(line.data);
+        break;
+      case 'G':
+        ++counts[1];
+        if (global_lines++ == 0) file.global_line = number;
+        global += line.data;
+        if (line.aligned && line.data.size() < section_column) global.append(section_column - line.data.size(), ' ');
+        break;
+      case 'D':
+        ++counts[2];
+        directory.push_back({line.data, number});
+        break;
+      case 'P': {
+        ++counts[3];
+        std::string_view data = line.data;
+        std::string_view owner;
+        if (line.aligned) {
+          owner = data.substr(64);
+          data = data.substr(0, 64);
+        } else {
+          const std::size_t at = data.size() > 8 ? data.size() - 8 : 0;
+          owner = data.substr(at);
+          data = data.substr(0, at);
+        }
+        file.parameter_lines.push_back({file.parameters.size(), number, parse_integer(owner).value_or(0)});
+        file.parameters += data;
+        if (data.size() < 64) file.parameters.append(64 - data.size(), ' ');
+        break;
+      }
+      default:
+        file.terminated = true;
+        terminate = line.data;
+    }
+    return true;
+  });
+
+  if (sections == 0) throw InputError(name + ": no line has a section letter in column 73: this is no IGES file");
+  if (global_lines == 0) throw InputError(name + ": the global section is missing");
+  read_global(file, global);
+  if (directory.empty()) throw InputError(name + ":" + std::to_string(last_line) + ": the directory section is missing");
+  file.entries.reserve(directory.size() / 2);
+  for (std::size_t i = 0; i + 1 < directory.size(); i += 2)
+    file.entries.push_back(read_entry(directory[i].data, directory[i + 1].data, directory[i].line, static_cast<int>(i) + 1));
+  if (directory.size() % 2 != 0) {
+    if (!file.terminated) throw InputError(name + ":" + std::to_string(last_line) + ": the file ends in its directory section");
+    note("odd directory", directory.back().line, "the directory has an odd number of lines; the last is ignored");
+  }
+  resolve_records(file);
+
+  if (file.terminated) {
+    const char letters[] = "SGDP";
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::string_view part = terminate.size() >= 8 * (k + 1) ? terminate.substr(8 * k, 8) : std::string_view();
+      if (part.empty() || part[0] != letters[k] || parse_integer(part.substr(1)).value_or(-1) != counts[k])
+        note("T counts", last_line, "the counts in the terminate line don't match the sections");
+    }
+  } else {
+    // Without its end a file is whole only if every record is.
+    Tokens tokens;
+    for (const Entry& entry : file.entries) {
+      if (entry.count > 0) tokenize(file.record(entry), file.delimiters, tokens);
+      if (entry.type != 0 && (entry.count == 0 || !tokens.terminated))
+        throw InputError(name + ":" + std::to_string(last_line) + ": the file ends early: no terminate line, and the record of " +
+                         "directory entry " + std::to_string(entry.sequence) + " (entity " + std::to_string(entry.type) +
+                         ") is not complete");
+    }
+    note("no T", last_line, "the terminate line is missing");
+  }
+  return result;
+}
+
+namespace {
+constexpr std::array<Unit, 10> units{{{1, "INCH", 0.0254},
+                                      {2, "MM", 0.001},
+                                      {4, "FT", 0.3048},
+                                      {5, "MI", 1609.344},
+                                      {6, "M", 1},
+                                      {7, "KM", 1000},
+                                      {8, "MIL", 2.54e-5},
+                                      {9, "UM", 1e-6},
+                                      {10, "CM", 0.01},
+                                      {11, "UIN", 2.54e-8}}};
+}
+
+std::optional<Unit> unit_of_flag(int flag) {
+  for (const Unit& unit : units)
+    if (unit.flag == flag) return unit;
+  return std::nullopt;
+}
+
+std::optional<Unit> unit_of_name(std::string_view name) {
+  std::string upper;
+  for (char c : trim(name)) upper += 'a' <= c && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+  if (upper == "IN" || upper == "INCHES") upper = "INCH";
+  if (upper == "MILLIMETER" || upper == "MILLIMETERS" || upper == "MILLIMETRE" || upper == "MILLIMETRES") upper = "MM";
+  if (upper == "CENTIMETER" || upper == "CENTIMETERS" || upper == "CENTIMETRE" || upper == "CENTIMETRES") upper = "CM";
+  if (upper == "METER" || upper == "METERS" || upper == "METRE" || upper == "METRES") upper = "M";
+  if (upper == "FOOT" || upper == "FEET") upper = "FT";
+  for (const Unit& unit : units)
+    if (upper == unit.name) return unit;
+  return std::nullopt;
+}
+
+}  // namespace toile::iges
