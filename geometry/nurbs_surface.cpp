@@ -5,6 +5,7 @@
 #include <string>
 
 #include "geometry/error.h"
+#include "geometry/rational_jet.h"
 #include "geometry/text.h"
 
 namespace toile {
@@ -61,38 +62,21 @@ Eigen::Vector3d NurbsSurface::operator()(double u, double v) const {
   return rational_ ? Eigen::Vector3d(x / w) : x;
 }
 
-namespace {
-
-// The quotient rule on homogeneous coordinates [Piegl & Tiller 1997, eq. 4.20]: rows of h are A, A_u, A_v, A_uu, A_uv,
-// A_vv with their weight functions in the last entry.
-SurfaceJet project(const std::array<Eigen::Vector4d, 6>& h) {
-  SurfaceJet jet;
-  const double w = h[0][3];
-  jet.x = h[0].head<3>() / w;
-  jet.u = (h[1].head<3>() - h[1][3] * jet.x) / w;
-  jet.v = (h[2].head<3>() - h[2][3] * jet.x) / w;
-  jet.uu = (h[3].head<3>() - 2 * h[1][3] * jet.u - h[3][3] * jet.x) / w;
-  jet.uv = (h[4].head<3>() - h[1][3] * jet.v - h[2][3] * jet.u - h[4][3] * jet.x) / w;
-  jet.vv = (h[5].head<3>() - 2 * h[2][3] * jet.v - h[5][3] * jet.x) / w;
-  return jet;
+SurfaceJet evaluate(const NurbsSurface& surface, double u, double v) {
+  return evaluate_on_span(surface, surface.u().find_span(u), surface.v().find_span(v), u, v);
 }
 
-}  // namespace
-
-SurfaceJet evaluate(const NurbsSurface& surface, double u, double v) {
+SurfaceJet evaluate_on_span(const NurbsSurface& surface, int span_u, int span_v, double u, double v) {
   BasisValues bu, bv;
-  evaluate_basis(surface.u(), u, 2, bu);
-  evaluate_basis(surface.v(), v, 2, bv);
-  const bool rational = surface.rational();
-  std::array<Eigen::Vector4d, 6> h;
+  evaluate_basis_on_span(surface.u(), span_u, u, 2, bu);
+  evaluate_basis_on_span(surface.v(), span_v, v, 2, bv);
+  detail::HomogeneousJet h;
   h.fill(Eigen::Vector4d::Zero());
   for (int b = 0; b <= bv.degree; ++b) {
     Eigen::Vector4d r0 = Eigen::Vector4d::Zero(), r1 = r0, r2 = r0;
     for (int a = 0; a <= bu.degree; ++a) {
-      const int k = surface.index(bu.first + a, bv.first + b);
-      Eigen::Vector4d point;
-      point << surface.points().col(k), 1.0;
-      if (rational) point *= surface.weight(k);
+      const Eigen::Vector4d point =
+          detail::homogeneous_point(surface, surface.index(bu.first + a, bv.first + b));
       r0 += bu.value[0][a] * point;
       r1 += bu.value[1][a] * point;
       r2 += bu.value[2][a] * point;
@@ -104,8 +88,7 @@ SurfaceJet evaluate(const NurbsSurface& surface, double u, double v) {
     h[4] += bv.value[1][b] * r1;
     h[5] += bv.value[2][b] * r0;
   }
-  if (rational) return project(h);
-  return {h[0].head<3>(), h[1].head<3>(), h[2].head<3>(), h[3].head<3>(), h[4].head<3>(), h[5].head<3>()};
+  return detail::to_jet(h, surface.rational());
 }
 
 void evaluate_basis_on_span(const NurbsSurface& surface, int span_u, int span_v, double u, double v,

@@ -51,6 +51,9 @@ struct SurfaceJet {
   Eigen::Vector3d x, u, v, uu, uv, vv;
 };
 SurfaceJet evaluate(const NurbsSurface& surface, double u, double v);
+// The same of the piece on the named spans (knot indices), continued where the point lies outside: one-sided derivatives
+// at knots.
+SurfaceJet evaluate_on_span(const NurbsSurface& surface, int span_u, int span_v, double u, double v);
 
 // The nonzero (rational) surface functions at a parameter with first and second derivatives.
 // Row r of `value` holds N, N_u, N_v, N_uu, N_uv, N_vv; entry a + (p_u+1) b belongs to control point
