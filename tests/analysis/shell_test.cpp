@@ -209,6 +209,23 @@ TEST(ShellModel, RationalCylinderHasTheCurvatureOfItsRadius) {
   }
 }
 
+TEST(ShellModel, CurvatureTurnsWithTheGrainAsATensor) {
+  Fabric fabric = stiff_fabric();
+  fabric.rest_curvature = RestCurvature::zero;
+  const NurbsSurface surface = test::bumpy_surface(3, 3, 2, true);
+  const auto tensor = [&](double grain) {
+    const ShellModel model({test::make_panel(surface, fabric, grain)});
+    const Eigen::Vector3d k = model.state(0, 0.3, 0.2, model.rest()).curvature;
+    return Eigen::Matrix2d{{k[0], k[2]}, {k[2], k[1]}};
+  };
+  const Eigen::Matrix2d straight = tensor(0);
+  EXPECT_GT(std::abs(straight(0, 1)), 0.01 * straight.norm());
+  for (const double grain : {0.3, 1.0, -2.0}) {
+    const Eigen::Matrix2d turn = Eigen::Rotation2Dd(grain).toRotationMatrix();
+    EXPECT_LT((tensor(grain) - turn.transpose() * straight * turn).norm(), 1e-12 * straight.norm());
+  }
+}
+
 TEST(ShellModel, CurvedPanelKeepsItsRestCurvatureUnlessTold) {
   Fabric fabric = stiff_fabric();
   const ShellModel own({test::make_panel(test::cylinder_surface(0.25, 2.0, 0.6, 4, 2), fabric)});
