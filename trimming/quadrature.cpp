@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/measure.h"
 #include "trimming/cell_boundary.h"
 #include "trimming/gauss.h"
 
@@ -181,6 +180,8 @@ class CutCellRule {
   void tabulate();
   double residual();
   bool correct();
+  void find_basis();
+  void pivot_on(int row, int column);
   void eliminate();
   void polish();
 
@@ -193,6 +194,9 @@ class CutCellRule {
   std::vector<Crossing> crossings_;
   std::vector<double> x_, y_, w_;  // candidates; weights over the area
   RowMajor phi_;                   // functions x candidates
+  RowMajor table_;                 // the same in terms of the basis points
+  std::vector<int> basis_;         // candidate of each row, -1: none
+  std::vector<char> in_basis_;
   Eigen::VectorXd error_;
 };
 
@@ -324,63 +328,70 @@ bool CutCellRule::correct() {
   return true;
 }
 
-void CutCellRule::eliminate() {
-  const int m = functions_;
-  const int n = static_cast<int>(x_.size());
-  if (n <= m) return;
-  RowMajor table = phi_;
-  // Gauss-Jordan with complete pivoting: the basis is r points on which the functions are well independent.
-  std::vector<int> basis(m, -1);
-  std::vector<char> in_basis(n, 0);
-  const auto pivot_on = [&](int row, int column) {
-    table.row(row) /= table(row, column);
-    for (int i = 0; i < m; ++i)
-      if (i != row && table(i, column) != 0) table.row(i) -= table(i, column) * table.row(row);
-    if (basis[row] >= 0) in_basis[basis[row]] = 0;
-    basis[row] = column;
-    in_basis[column] = 1;
-  };
-  for (int step = 0; step < m; ++step) {
+void CutCellRule::pivot_on(int row, int column) {
+  table_.row(row) /= table_(row, column);
+  for (int i = 0; i < functions_; ++i)
+    if (i != row && table_(i, column) != 0) table_.row(i) -= table_(i, column) * table_.row(row);
+  if (basis_[row] >= 0) in_basis_[basis_[row]] = 0;
+  basis_[row] = column;
+  in_basis_[column] = 1;
+}
+
+// Gauss-Jordan with complete pivoting: points on which the functions are well independent, one for each function but
+// for those that depend on the others in double precision (a thin slanted sliver).
+void CutCellRule::find_basis() {
+  constexpr double dependent = 1e-13;
+  table_ = phi_;
+  basis_.assign(functions_, -1);
+  in_basis_.assign(w_.size(), 0);
+  for (int step = 0; step < functions_; ++step) {
     int row = -1, column = -1;
-    double largest = 1e-13;
-    for (int i = 0; i < m; ++i) {
-      if (basis[i] >= 0) continue;
+    double largest = dependent;
+    for (int i = 0; i < functions_; ++i) {
+      if (basis_[i] >= 0) continue;
       Eigen::Index j = 0;
-      const double size = table.row(i).cwiseAbs().maxCoeff(&j);
+      const double size = table_.row(i).cwiseAbs().maxCoeff(&j);
       if (size > largest) {
         largest = size;
         row = i;
         column = static_cast<int>(j);
       }
     }
-    if (row < 0) break;
+    if (row < 0) return;
     pivot_on(row, column);
   }
+}
+
+void CutCellRule::eliminate() {
+  const int n = static_cast<int>(x_.size());
+  if (n <= functions_) return;
+  find_basis();
   // Each remaining point is a combination of the basis points: weight moves along that null vector, in the direction
   // with the better pivot, until a point has none left.
   for (int j = 0; j < n; ++j) {
-    if (in_basis[j] || w_[j] == 0) continue;
+    if (in_basis_[j] || w_[j] == 0) continue;
     int leave_up = -1, leave_down = -1;
     double up = w_[j], down = HUGE_VAL;  // how far the weight of j can fall, rise
-    for (int i = 0; i < m; ++i) {
-      if (basis[i] < 0) continue;
-      const double c = table(i, j);
-      if (c < 0 && w_[basis[i]] < up * -c) {
-        up = w_[basis[i]] / -c;
+    for (int i = 0; i < functions_; ++i) {
+      if (basis_[i] < 0) continue;
+      const double c = table_(i, j);
+      if (c < 0 && w_[basis_[i]] < up * -c) {
+        up = w_[basis_[i]] / -c;
         leave_up = i;
-      } else if (c > 0 && w_[basis[i]] < down * c) {
-        down = w_[basis[i]] / c;
+      } else if (c > 0 && w_[basis_[i]] < down * c) {
+        down = w_[basis_[i]] / c;
         leave_down = i;
       }
     }
-    const bool fall = leave_up < 0 || leave_down < 0 || std::abs(table(leave_up, j)) >= std::abs(table(leave_down, j));
+    const bool fall =
+        leave_up < 0 || leave_down < 0 || std::abs(table_(leave_up, j)) >= std::abs(table_(leave_down, j));
     const double move = fall ? up : -down;
     const int leave = fall ? leave_up : leave_down;
-    for (int i = 0; i < m; ++i)
-      if (basis[i] >= 0) w_[basis[i]] = std::max(w_[basis[i]] + move * table(i, j), 0.0);
+    for (int i = 0; i < functions_; ++i)
+      if (basis_[i] >= 0) w_[basis_[i]] = std::max(w_[basis_[i]] + move * table_(i, j), 0.0);
     w_[j] -= move;
     if (leave >= 0) {
-      w_[basis[leave]] = 0;
+      w_[basis_[leave]] = 0;
       pivot_on(leave, j);
     } else {
       w_[j] = 0;
@@ -405,14 +416,23 @@ void CutCellRule::eliminate() {
 void CutCellRule::polish() {
   const auto n = static_cast<Eigen::Index>(w_.size());
   Eigen::Map<Eigen::VectorXd> w(w_.data(), n);
-  for (int step = 0; step < 2 && residual() > 1e-15; ++step) {
-    const Eigen::VectorXd change = n == functions_ ? Eigen::VectorXd(phi_.partialPivLu().solve(error_))
-                                                   : Eigen::VectorXd(phi_.fullPivLu().solve(error_));
-    const Eigen::VectorXd polished = w + change;
-    if (!(polished.minCoeff() > 0)) return;
-    const double before = error_.cwiseAbs().maxCoeff();
-    if (!((moments_ - phi_ * polished).cwiseAbs().maxCoeff() < before)) return;
-    w = polished;
+  double before = residual();
+  for (int step = 0; step < 3 && before > 1e-15; ++step) {
+    const Eigen::VectorXd kept = w;
+    bool better = false;
+    if (n == functions_) {
+      const Eigen::VectorXd polished = w + phi_.partialPivLu().solve(error_);
+      better = polished.minCoeff() > 0;
+      if (better) w = polished;
+    }
+    // Fewer points, or nearly dependent ones: the smallest relative change that keeps every weight positive.
+    if (!better) better = correct();
+    const double after = residual();
+    if (!better || !(after < before)) {
+      w = kept;
+      return;
+    }
+    before = after;
   }
 }
 
@@ -424,9 +444,9 @@ CutCellRule::Result CutCellRule::build(CellBoundary& boundary, int degree_x, int
   scale_to_box(boundary, box);
   degree_x_ = degree_x;
   degree_y_ = degree_y;
-  functions_ = (degree_x + 1) * (degree_y + 1);
   legendre_moments(boundary.pieces, degree_x, degree_y, exact_);
   if (!(exact_[0] > 0)) return {};
+  functions_ = (degree_x + 1) * (degree_y + 1);
   moments_.resize(functions_);
   for (int k = 0; k < functions_; ++k) moments_[k] = static_cast<double>(exact_[k] / exact_[0]);
   prepare(boundary);
@@ -443,8 +463,11 @@ CutCellRule::Result CutCellRule::build(CellBoundary& boundary, int degree_x, int
   Result result;
   result.area = static_cast<double>(exact_[0] * box.half_x * box.half_y);
   result.residual = residual();
+  double weight = 0;
+  for (const double w : w_) weight += w;
   for (std::size_t k = 0; k < x_.size(); ++k)
-    nodes.push_back({box.centre_x + box.half_x * x_[k], box.centre_y + box.half_y * y_[k], w_[k] * result.area});
+    nodes.push_back(
+        {box.centre_x + box.half_x * x_[k], box.centre_y + box.half_y * y_[k], w_[k] / weight * result.area});
   return result;
 }
 

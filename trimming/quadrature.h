@@ -13,22 +13,22 @@ namespace toile {
 struct CellRule {
   int i = 0, j = 0;
   int first = 0, count = 0;
-  bool tensor = false;       // Gauss points, u fastest: the cell is uncut
-  double area = 0;           // exact area of its material in the parameter plane (sum of weights)
-  double cut_fraction = 1;   // area over the cell's area
+  bool tensor = false;      // Gauss points, u fastest: the cell is uncut
+  double area = 0;          // exact area of its material in the parameter plane (sum of weights)
+  double cut_fraction = 1;  // area over the cell's area
 };
 
 //   (1) every point lies in the material of its cell; every weight is positive;
 //   (2) uncut cells: (p_u + 1) x (p_v + 1) Gauss points;
-//   (3) cut cells: u^a v^b integrated exactly for a <= degree_u, b <= degree_v (relative 1e-12 of the cell's moments for
-//       polynomial trims; rational trims to their convergence);
+//   (3) cut cells: u^a v^b integrated exactly for a <= degree_u, b <= degree_v (relative 1e-12 of the cell's moments
+//       for polynomial trims; rational trims to rounding) with at most (degree_u + 1)(degree_v + 1) points;
 //   (4) cells ordered by mesh.cell.
 struct CutQuadrature {
   std::vector<CellRule> cells;
   std::vector<Eigen::Vector2d> points;
-  std::vector<double> weights;         // parameter area
-  double area = 0;                     // of the material, parameter plane
-  double moment_residual = 0;          // largest relative moment error over all cut cells
+  std::vector<double> weights;  // parameter area
+  double area = 0;              // of the material, parameter plane
+  double moment_residual = 0;   // largest relative moment error over all cut cells
 };
 
 struct QuadratureOptions {
