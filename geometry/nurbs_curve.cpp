@@ -33,8 +33,13 @@ NurbsCurve<Dim>::NurbsCurve(KnotVector knots, Points points, std::vector<double>
 
 template <int Dim>
 CurveJet<Dim> evaluate(const NurbsCurve<Dim>& curve, double t) {
+  return evaluate_on_span(curve, curve.knots().find_span(t), t);
+}
+
+template <int Dim>
+CurveJet<Dim> evaluate_on_span(const NurbsCurve<Dim>& curve, int span, double t) {
   BasisValues basis;
-  evaluate_basis(curve.knots(), t, 2, basis);
+  evaluate_basis_on_span(curve.knots(), span, t, 2, basis);
   CurveJet<Dim> jet;
   jet.x.setZero();
   jet.d1.setZero();
@@ -146,6 +151,8 @@ template class NurbsCurve<2>;
 template class NurbsCurve<3>;
 template CurveJet<2> evaluate(const NurbsCurve<2>&, double);
 template CurveJet<3> evaluate(const NurbsCurve<3>&, double);
+template CurveJet<2> evaluate_on_span(const NurbsCurve<2>&, int, double);
+template CurveJet<3> evaluate_on_span(const NurbsCurve<3>&, int, double);
 template NurbsCurve<2> line_segment(const Eigen::Matrix<double, 2, 1>&, const Eigen::Matrix<double, 2, 1>&);
 template NurbsCurve<3> line_segment(const Eigen::Matrix<double, 3, 1>&, const Eigen::Matrix<double, 3, 1>&);
 template double arc_length(const NurbsCurve<2>&, Interval, double);

@@ -53,6 +53,9 @@ struct CurveJet {
 };
 template <int Dim>
 CurveJet<Dim> evaluate(const NurbsCurve<Dim>& curve, double t);
+// The same of the piece on the named span (knot index), continued where t lies outside: one-sided derivatives at knots.
+template <int Dim>
+CurveJet<Dim> evaluate_on_span(const NurbsCurve<Dim>& curve, int span, double t);
 
 template <int Dim>
 NurbsCurve<Dim> line_segment(const Eigen::Matrix<double, Dim, 1>& a, const Eigen::Matrix<double, Dim, 1>& b);
