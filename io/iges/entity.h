@@ -28,6 +28,7 @@ void write(const SplineCurve& curve, Record& out);
 struct SplineSurface {
   NurbsSurface surface;
   Interval u, v;
+  bool covers_domain() const;
 };
 SplineSurface read_spline_surface(Parameters& in);
 void write(const SplineSurface& surface, Record& out);

@@ -197,9 +197,16 @@ void Parameters::fail_token(const char* what, int number, std::string_view text,
 
 Record::Record(int type, Delimiters delimiters) : type_(type), delimiters_(delimiters) { integer(type); }
 
+Record Record::global(Delimiters delimiters) {
+  Record record(delimiters, 72);
+  record.string(std::string_view(&delimiters.parameter, 1));
+  record.string(std::string_view(&delimiters.record, 1));
+  return record;
+}
+
 // A token is held back until its delimiter is known, so that both stand on one line.
 void Record::put(std::string_view text, bool breakable) {
-  constexpr std::size_t columns = 64;
+  const std::size_t columns = columns_;
   const std::size_t used = text_.size() % columns;
   if (!breakable) {
     if (used + text.size() > columns && used > 0) text_.append(columns - used, ' ');
@@ -236,7 +243,7 @@ Record& Record::string(std::string_view value) {
 std::string Record::finish() {
   put(pending_ += delimiters_.record, pending_breakable_);
   pending_.clear();
-  if (text_.size() % 64 != 0) text_.append(64 - text_.size() % 64, ' ');
+  if (text_.size() % columns_ != 0) text_.append(columns_ - text_.size() % columns_, ' ');
   return std::move(text_);
 }
 

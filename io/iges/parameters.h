@@ -72,21 +72,25 @@ class Parameters {
 // A parameter record being written: 64 columns a line, numbers never broken over lines.
 class Record {
  public:
-  Record(int type, Delimiters delimiters = {});
+  explicit Record(int type, Delimiters delimiters = {});
+  // The global section: 72 columns, beginning with its delimiters.
+  static Record global(Delimiters delimiters = {});
   Record& integer(long long value);
   Record& real(double value);  // shortest decimal that reads back to the same bits, with a point
   Record& string(std::string_view value);
   Record& token(const Token& value);  // as it stood
   Record& blank();
   int type() const { return type_; }
-  // The lines, 64 columns each, blank-padded.
+  // The lines, all of the same width, blank-padded.
   std::string finish();
 
  private:
+  Record(Delimiters delimiters, std::size_t columns) : delimiters_(delimiters), columns_(columns) {}
   void put(std::string_view text, bool breakable);
 
-  int type_;
+  int type_ = 0;
   Delimiters delimiters_;
+  std::size_t columns_ = 64;
   std::string text_;
   std::string pending_;
   bool first_ = true;

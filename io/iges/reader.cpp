@@ -33,7 +33,7 @@ class Reader {
   void append_curves(const Entry& e, std::vector<Piece>& out, int depth);
   std::vector<Piece> curves(int sequence, const Entry& from, const char* role);
   TrimLoop loop(const Entry& boundary, int surface, const NurbsSurface& s, const Eigen::Affine3d& face_transform);
-  NurbsSurface surface(const Entry& e, std::string& name);
+  NurbsSurface surface(const Entry& e, bool trimmed, std::string& name);
   TrimmedSurface face(const Entry& e);
   TrimmedSurface free_surface(const Entry& e);
   std::string name_property(Parameters& in);
@@ -234,20 +234,27 @@ TrimLoop Reader::loop(const Entry& e, int surface, const NurbsSurface& s, const 
   return out;
 }
 
-NurbsSurface Reader::surface(const Entry& e, std::string& name) {
+// U0 to V1 say where an untrimmed surface ends. Where a loop bounds it the loop decides, and the surface keeps its own
+// knots and net: several exporters put the loop's bounding box there.
+NurbsSurface Reader::surface(const Entry& e, bool trimmed, std::string& name) {
   if (e.type != 128)
     throw InputError(file_.place(e) + "as a face's surface it is not read yet, must be 128");
   Parameters in(file_, e, &notes_);
   const SplineSurface spline = read_spline_surface(in);
   name = name_property(in);
-  NurbsSurface s;
-  try {
-    s = restricted(spline);
-  } catch (const GeometryError& error) {
-    in.fail(error.what());
+  NurbsSurface s = spline.surface;
+  bool partial = !(spline.covers_domain());
+  if (partial && trimmed) {
+    note(e, "partial", "U0 to V1 name a part of the knots' domain; the face is trimmed, so the domain stays");
+    partial = false;
+  } else if (partial) {
+    note(e, "restricted", "U0 to V1 name a part of the knots' domain; the surface is restricted to it");
+    try {
+      s = restricted(spline);
+    } catch (const GeometryError& error) {
+      in.fail(error.what());
+    }
   }
-  const bool partial = !(s.u() == spline.surface.u() && s.v() == spline.surface.v());
-  if (partial) note(e, "partial", "U0 to V1 name a part of the knots' domain; the surface is restricted to it");
   const Eigen::Affine3d t = transform(e);
   if (!is_identity(t)) s = s.with_points(t * s.points());
   mark(e, partial ? Disposition::converted : Disposition::read, partial ? "restricted to U0, U1, V0, V1" : "");
@@ -284,7 +291,7 @@ TrimmedSurface Reader::face(const Entry& e) {
   const Eigen::Affine3d t = transform(e);
   const Entry& support = entry(record.surface, e, "surface");
   std::string surface_name;
-  out.surface = surface(support, surface_name);
+  out.surface = surface(support, record.outer != 0, surface_name);
   if (out.name.empty()) out.name = surface_name;
   if (!is_identity(t)) out.surface = out.surface.with_points(t * out.surface.points());
   if (record.outer_was_denied) note(e, "N1", "N1 is 0 though an outer boundary is given; the boundary is taken");
@@ -305,7 +312,7 @@ TrimmedSurface Reader::face(const Entry& e) {
 
 TrimmedSurface Reader::free_surface(const Entry& e) {
   TrimmedSurface out;
-  out.surface = surface(e, out.name);
+  out.surface = surface(e, false, out.name);
   out.loops.push_back(natural_loop(out.surface));
   out.natural_bounds = true;
   return out;

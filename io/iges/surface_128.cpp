@@ -101,9 +101,11 @@ bool whole(Interval range, const KnotVector& knots) {
 
 }  // namespace
 
+bool SplineSurface::covers_domain() const { return whole(u, surface.u()) && whole(v, surface.v()); }
+
 NurbsSurface restricted(const SplineSurface& spline) {
   NurbsSurface out = spline.surface;
-  if (whole(spline.u, out.u()) && whole(spline.v, out.v())) return out;
+  if (spline.covers_domain()) return out;
   if (!whole(spline.u, out.u())) out = restrict_u(out, spline.u);
   if (!whole(spline.v, out.v())) out = transposed(restrict_u(transposed(out), spline.v));
   return clamp(out);

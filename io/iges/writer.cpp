@@ -1,0 +1,218 @@
+// Faces to records. Parameter curves are written as they are; model curves are made anew from the surface.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+#include "geometry/error.h"
+#include "io/iges.h"
+#include "io/iges/cards.h"
+#include "io/iges/entity.h"
+#include "io/iges/model_curve.h"
+
+namespace toile {
+
+namespace iges {
+namespace {
+
+// Model curves follow the surface to this fraction of the face's size: 1e-5 mm on a garment panel of a metre.
+constexpr double curve_tolerance = 1e-8;
+
+constexpr const char* independent = "00000000";
+constexpr const char* dependent = "00010000";
+constexpr const char* parametric = "00010500";
+constexpr const char* definition = "00000200";
+
+class FaceWriter {
+ public:
+  explicit FaceWriter(std::vector<OutRecord>& records) : records_(records) {}
+  void add(const OutputFace& output);
+  double largest_fit() const { return largest_fit_; }
+
+ private:
+  // Appends the record; returns its directory number.
+  int add(const Card& card, Record& record) {
+    records_.push_back({make_cards(card), record.finish()});
+    return 2 * static_cast<int>(records_.size()) - 1;
+  }
+  template <class T>
+  int add(const Card& card, const T& entity) {
+    Record record(card.type);
+    write(entity, record);
+    return add(card, record);
+  }
+  int curve(const Curve3& c, const char* status);
+  int chain(const std::vector<int>& curves, const char* status);
+  int boundary(const TrimLoop& loop, const NurbsSurface& surface, int surface_number,
+               const std::optional<AffinePatch>& patch, double tolerance);
+  int colour(const std::array<double, 3>& rgb);
+
+  std::vector<OutRecord>& records_;
+  std::map<std::array<double, 3>, int> colours_;
+  double largest_fit_ = 0;
+};
+
+int FaceWriter::curve(const Curve3& c, const char* status) {
+  return add({.type = 126, .status = status}, SplineCurve{c, c.domain()});
+}
+
+int FaceWriter::chain(const std::vector<int>& curves, const char* status) {
+  if (curves.size() == 1) return curves[0];
+  Record record(102);
+  write_composite(curves, record);
+  return add({.type = 102, .status = status}, record);
+}
+
+int FaceWriter::colour(const std::array<double, 3>& rgb) {
+  const auto found = colours_.find(rgb);
+  if (found != colours_.end()) return found->second;
+  const Colour entity{100 * rgb[0], 100 * rgb[1], 100 * rgb[2], {}};
+  return colours_[rgb] = add({.type = 314, .status = definition}, entity);
+}
+
+// The curves in the file's order and direction. A loop that is traversed against it has all its curves reversed; a curve
+// that alone runs against its loop is turned, so that what is written is head to tail.
+std::vector<Curve2> in_file_order(const TrimLoop& loop) {
+  std::vector<const TrimCurve*> curves;
+  for (const TrimCurve& c : loop.curves) curves.push_back(&c);
+  const auto against = std::count_if(curves.begin(), curves.end(), [](const TrimCurve* c) { return c->reversed; });
+  const bool backwards = 2 * static_cast<std::size_t>(against) > curves.size();
+  if (backwards) std::reverse(curves.begin(), curves.end());
+  const auto first = std::min_element(curves.begin(), curves.end(),
+                                      [](const TrimCurve* a, const TrimCurve* b) { return a->index < b->index; });
+  std::rotate(curves.begin(), first, curves.end());
+  std::vector<Curve2> out;
+  for (const TrimCurve* c : curves) out.push_back(c->reversed == backwards ? c->curve : reversed(c->curve));
+  return out;
+}
+
+int FaceWriter::boundary(const TrimLoop& loop, const NurbsSurface& surface, int surface_number,
+                         const std::optional<AffinePatch>& patch, double tolerance) {
+  std::vector<int> parameter_curves, model_curves;
+  const std::vector<Curve2> curves = in_file_order(loop);
+  for (const Curve2& c : curves) {
+    Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, c.points().cols());
+    points.topRows<2>() = c.points();
+    parameter_curves.push_back(curve(Curve3(c.knots(), std::move(points), c.weights()), parametric));
+  }
+  const int parameter_chain = chain(parameter_curves, parametric);
+  for (const Curve2& c : curves) {
+    const ModelCurve model = fit_model_curve(surface, c, tolerance, patch);
+    largest_fit_ = std::max(largest_fit_, model.error);
+    model_curves.push_back(curve(model.curve, dependent));
+  }
+  const int model_chain = chain(model_curves, dependent);
+  return add({.type = 142, .status = dependent},
+             Boundary{.creation = 0, .surface = surface_number, .parameter_curve = parameter_chain,
+                      .model_curve = model_chain, .preference = 1});
+}
+
+void FaceWriter::add(const OutputFace& output) {
+  const TrimmedSurface& face = output.face;
+  const NurbsSurface& s = face.surface;
+  const std::string& name = output.name.empty() ? face.name : output.name;
+  const int colour_number = output.colour ? -colour(*output.colour) : 0;
+  int name_number = 0;
+  if (!name.empty()) {
+    Record record(406);
+    write_name(name, record);
+    name_number = add({.type = 406, .form = 15, .status = dependent}, record);
+  }
+  auto finish = [&](const Card& card, Record& record) {
+    // No associativities, one property.
+    if (name_number != 0) record.integer(0).integer(1).integer(name_number);
+    add(card, record);
+  };
+  const SplineSurface spline{s, s.u().domain(), s.v().domain()};
+  // A face without a trim is the surface itself, free-standing.
+  if (face.natural_bounds) {
+    Record record(128);
+    write(spline, record);
+    finish({.type = 128, .level = output.level, .colour = colour_number, .status = independent}, record);
+    return;
+  }
+  const double size = (s.points().rowwise().maxCoeff() - s.points().rowwise().minCoeff()).norm();
+  const std::optional<AffinePatch> patch = affine_patch(s, 1e-12 * size);
+  const int surface_number = add({.type = 128, .status = dependent}, spline);
+  std::vector<const TrimLoop*> loops;
+  for (const TrimLoop& loop : face.loops) loops.push_back(&loop);
+  std::stable_sort(loops.begin(), loops.end(), [](const TrimLoop* a, const TrimLoop* b) {
+    return a->kind != b->kind ? a->kind == LoopKind::outer : a->index < b->index;
+  });
+  Face record_of_face;
+  record_of_face.surface = surface_number;
+  for (const TrimLoop* loop : loops) {
+    const int number = boundary(*loop, s, surface_number, patch, curve_tolerance * size);
+    if (loop->kind == LoopKind::outer && record_of_face.outer == 0) {
+      record_of_face.outer = number;
+    } else {
+      record_of_face.holes.push_back(number);
+    }
+  }
+  Record record(144);
+  write(record_of_face, record);
+  finish({.type = 144, .level = output.level, .colour = colour_number, .status = independent}, record);
+}
+
+// YYYYMMDD.HHNNSS in UTC of a Unix time.
+std::string format_date(long long seconds) {
+  using namespace std::chrono;
+  const sys_seconds time{std::chrono::seconds(seconds)};
+  const sys_days day = floor<days>(time);
+  const year_month_day date(day);
+  const hh_mm_ss clock(time - day);
+  auto digits = [](long long value, std::size_t width) {
+    std::string text = std::to_string(value);
+    return text.size() < width ? std::string(width - text.size(), '0') + text : text;
+  };
+  return digits(static_cast<int>(date.year()), 4) + digits(static_cast<unsigned>(date.month()), 2) +
+         digits(static_cast<unsigned>(date.day()), 2) + "." + digits(clock.hours().count(), 2) +
+         digits(clock.minutes().count(), 2) + digits(clock.seconds().count(), 2);
+}
+
+std::string date_of(const IgesHeader& header) {
+  if (header.date) return *header.date;
+  const char* epoch = std::getenv("SOURCE_DATE_EPOCH");
+  constexpr int last = 2147483647;
+  const int seconds = epoch ? parse_integer(epoch).value_or(0) : 0;
+  return format_date(std::clamp(seconds, 0, last));
+}
+
+std::string global_section(const IgesHeader& header, const Unit& unit, double scale, double resolution, double largest) {
+  const std::string date = date_of(header);
+  Record g = Record::global();
+  g.string(header.product).string(header.product + ".igs").string("toile").string("toile");
+  g.integer(32).integer(308).integer(15).integer(308).integer(15);
+  g.string(header.product).real(scale).integer(unit.flag).string(unit.name).integer(1).real(0);
+  g.string(date).real(resolution).real(largest).string("toile").blank().integer(11).integer(0).string(date);
+  return g.finish();
+}
+
+}  // namespace
+}  // namespace iges
+
+IgesOutput format_iges(std::span<const OutputFace> faces, const IgesHeader& header) {
+  using namespace iges;
+  const std::optional<Unit> unit = unit_of_name(header.unit);
+  if (!unit) throw GeometryError("'" + header.unit + "' is no length unit of IGES");
+  double scale = 1, largest = 0;
+  std::vector<OutRecord> records;
+  FaceWriter writer(records);
+  for (const OutputFace& face : faces) {
+    // Sources with a model scale other than 1 keep their numbers, so the scale must be said again.
+    const double ratio = unit->metres / face.face.metres_per_unit;
+    const double own = std::abs(ratio - 1) <= 1e-12 ? 1 : ratio;
+    if (&face == &faces.front()) scale = own;
+    if (own != scale) throw GeometryError("face '" + face.name + "' has another unit than the faces before it");
+    largest = std::max(largest, face.face.surface.points().cwiseAbs().maxCoeff());
+    writer.add(face);
+  }
+  IgesOutput out;
+  out.largest_curve_fit = writer.largest_fit();
+  const double resolution = std::max(header.resolution, out.largest_curve_fit);
+  out.text = assemble({}, global_section(header, *unit, scale, resolution, largest), records);
+  return out;
+}
+
+}  // namespace toile
