@@ -280,5 +280,41 @@ TEST(CutQuadrature, UncutCellsCarryGaussPoints) {
   expect_near_rel(moment(rule, 5, 3), 64.0 / 6 * 81 / 4, 1e-14);
 }
 
+// A quarter of a cylinder of radius 2 and height 3, rational: area and lengths are those of the flat sheet it rolls up.
+TEST(PanelMeasure, TrimmedCylinder) {
+  const double h = std::sqrt(0.5);
+  Eigen::Matrix3Xd net(3, 6);
+  net << 2, 2, 0, 2, 2, 0,  //
+      0, 2, 2, 0, 2, 2,     //
+      0, 0, 0, 3, 3, 3;
+  HandMade made = cut_cell(2, {{border({0, 0}, {1, 0}), border({1, 0}, {1, 1}), trim({1, 1}, {0, 0})}});
+  made.surface.surface = NurbsSurface(uniform_knots(2, 1), uniform_knots(1, 1), net, {1, h, 1, 1, h, 1});
+  // The angle is symmetric about u = 1/2, so the part below v = u is half of the sheet by symmetry.
+  const PanelMeasure cut = measure(made.surface, made.topology);
+  expect_near_rel(cut.area, std::numbers::pi * 3 / 2, 1e-10);
+  made.topology.cells = {CellKind::inside};
+  made.topology.cut_cells.clear();
+  made.surface.loops = {natural_loop(made.surface.surface)};
+  const PanelMeasure whole = measure(made.surface, made.topology);
+  expect_near_rel(whole.area, std::numbers::pi * 3, 1e-10);
+  ASSERT_EQ(whole.loop_lengths.size(), 1u);
+  expect_near_rel(whole.loop_lengths[0], 2 * std::numbers::pi + 6, 1e-10);
+}
+
+// A disc trim on a hyperbolic paraboloid z = u v / 2: area is 2 pi times the integral of r sqrt(1 + r^2 / 4).
+TEST(PanelMeasure, DiscOnASaddle) {
+  const double r = 0.75;
+  HandMade made = cut_cell({-1, 1}, {-1, 1}, 1, {{trim(circular_arc({0, 0}, r, 0, 2 * std::numbers::pi))}});
+  Eigen::Matrix3Xd net = made.surface.surface.points();
+  for (int k = 0; k < net.cols(); ++k) net(2, k) = net(0, k) * net(1, k) / 2;
+  made.surface.surface = made.surface.surface.with_points(net);
+  const PanelMeasure saddle = measure(made.surface, made.topology);
+  expect_near_rel(saddle.area, 2 * std::numbers::pi * 4 / 3 * (std::pow(1 + r * r / 4, 1.5) - 1), 1e-10);
+  // z' = r^2 cos(2 a) / 2 around the circle.
+  double length = 0;
+  for (int k = 0; k < 4096; ++k) length += std::hypot(r, r * r / 2 * std::cos(4 * std::numbers::pi * k / 4096));
+  expect_near_rel(saddle.loop_lengths[0], length * 2 * std::numbers::pi / 4096, 1e-10);
+}
+
 }  // namespace
 }  // namespace toile::test
