@@ -1,12 +1,18 @@
-// Eight numbers at once, one for each of eight cells: the compiler turns these operations into the widest instructions
-// that the machine has. The same kernels run on plain doubles.
+// Several numbers at once, one for each of several cells: as many as the machine's registers hold. The same kernels run
+// on plain doubles.
 #pragma once
 
 #include <cmath>
 
 namespace toile {
 
+#if defined(__AVX512F__)
 inline constexpr int lane_count = 8;
+#elif defined(__AVX__)
+inline constexpr int lane_count = 4;
+#else
+inline constexpr int lane_count = 2;
+#endif
 using Lanes = double __attribute__((vector_size(lane_count * sizeof(double))));
 using LaneMask = decltype(Lanes{} < Lanes{});
 
@@ -26,6 +32,10 @@ inline Real broadcast(double a) {
 }
 
 // Sum in a fixed order.
-inline double sum(Lanes a) { return ((a[0] + a[1]) + (a[2] + a[3])) + ((a[4] + a[5]) + (a[6] + a[7])); }
+inline double sum(Lanes a) {
+  double total = 0;
+  for (int l = 0; l < lane_count; ++l) total += a[l];
+  return total;
+}
 
 }  // namespace toile
