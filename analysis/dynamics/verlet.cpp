@@ -41,26 +41,20 @@ double drag_factor(const ShellModel& model, const ScalarRow& row, double dt) {
   return mass > 0 ? 1 + 0.5 * dt * drag / mass : 1;
 }
 
-Eigen::Vector3d combination(const ScalarRow& row, const Vector& q) {
-  Eigen::Vector3d y = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * q.segment<3>(3 * row.index[k]);
-  return y;
-}
-
 void add(const ScalarRow& row, const Eigen::Vector3d& force, Vector& f) {
   for (std::size_t k = 0; k < row.index.size(); ++k) f.segment<3>(3 * row.index[k]) += row.value[k] * force;
 }
 
 // Adds the constraints' forces to f (control points) and returns those of the place rows.
-Eigen::Matrix3Xd add_constraint_forces(const DynamicSystem& system, const Vector& q, double dt, Vector& f) {
+Eigen::Matrix3Xd add_constraint_forces(const DynamicSystem& system, double dt, Vector& f) {
   if (!system.projection) return Eigen::Matrix3Xd(3, 0);
   const FastProjection& projection = *system.projection;
   const ConstraintRows& rows = projection.rows();
   const double per_step = 1 / (dt * dt);
   for (std::size_t r = 0; r < rows.strain.size(); ++r) {
     const ScalarRow& row = rows.strain[r].row;
-    const double weight = projection.strain_multipliers()[r] * per_step * drag_factor(*system.model, row, dt);
-    if (weight != 0) add(row, -weight * combination(row, q), f);
+    const Eigen::Vector3d impulse = projection.strain_impulses().col(r);
+    if (!impulse.isZero(0)) add(row, -per_step * drag_factor(*system.model, row, dt) * impulse, f);
   }
   Eigen::Matrix3Xd place(3, rows.place.size());
   for (std::size_t p = 0; p < rows.place.size(); ++p) {
@@ -72,8 +66,7 @@ Eigen::Matrix3Xd add_constraint_forces(const DynamicSystem& system, const Vector
 }
 
 // Work that moved pins do on the cloth between two states: their force against what the cloth pulls, trapezoidal.
-double motion_work(const DynamicSystem& system, const Vector& q0, double t0, const Vector& q1, double t1,
-                   const Vector& f1) {
+double motion_work(const DynamicSystem& system, const Vector& q0, double t0, double t1, const Vector& f1) {
   const AffineMap& map = *system.map;
   const Eigen::Matrix3Xd moves = map.fixed_places(t1) - map.fixed_places(t0);
   std::vector<Eigen::Vector3d> target_moves;
@@ -86,7 +79,7 @@ double motion_work(const DynamicSystem& system, const Vector& q0, double t0, con
   if (still) return 0;
 
   Vector f = 0.5 * (total_force(system, q0) + f1);
-  const Eigen::Matrix3Xd place = add_constraint_forces(system, q1, t1 - t0, f);
+  const Eigen::Matrix3Xd place = add_constraint_forces(system, t1 - t0, f);
   double work = 0;
   for (std::size_t p = 0; p < target_moves.size(); ++p) work += place.col(p).dot(target_moves[p]);
   for (int i = 0; i < map.control_points(); ++i)
@@ -137,7 +130,7 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
   report.finite = std::isfinite(report.kinetic) && std::isfinite(report.elastic.total()) && next.x.allFinite() &&
                   next.a.allFinite();
   if (!report.finite) return report;
-  report.motion_work = motion_work(system, q0, state.t, q1, next.t, force);
+  report.motion_work = motion_work(system, q0, state.t, next.t, force);
   state = std::move(next);
   return report;
 }
@@ -149,7 +142,7 @@ Reactions reactions(const DynamicSystem& system, const DynamicState& state, doub
   map.expand(state.x, state.t, q);
   Vector f = total_force(system, q);
   Reactions out;
-  out.place = add_constraint_forces(system, q, dt, f);
+  out.place = add_constraint_forces(system, dt, f);
 
   // Velocity and acceleration of the pins themselves, from where they have been.
   const Eigen::Matrix3Xd now = map.fixed_places(state.t), before = map.fixed_places(state.t - dt),

@@ -35,4 +35,11 @@ struct ConstraintRows {
   std::vector<PlaceRow> place;
 };
 
+// Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points() gives
+// them. Functions that vanish at a point (all but p per direction on a C1 knot line) are left out.
+std::vector<StrainRow> strain_rows(const ShellModel& model, const std::vector<std::vector<ConstraintPoint>>& points);
+
+// The row of one material point's place, for pins.
+ScalarRow place_row(const ShellModel& model, int panel, double u, double v);
+
 }  // namespace toile

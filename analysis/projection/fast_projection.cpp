@@ -13,7 +13,7 @@
 namespace toile {
 namespace {
 
-constexpr int patience = 5;            // iterations without gain before giving up
+constexpr int patience = 15;           // iterations without gain before giving up; dependent rows make pauses of up to 10
 constexpr double least_gain = 0.99;    // a violation above this times the best so far is no gain
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 
@@ -37,7 +37,7 @@ struct FastProjection::Impl {
   Eigen::Matrix3Xd y, direction, targets, fixed_places;  // direction: scaled, per system row
   Eigen::VectorXd scale, residual, rhs, solution;
   Eigen::VectorXd strain_lambda;
-  Eigen::Matrix3Xd place_lambda;
+  Eigen::Matrix3Xd place_lambda, strain_impulse;
 
   Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
       : map(m), rows(std::move(r)), options(o), composed(compose(map, rows)) {}
@@ -102,6 +102,7 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   solution.resize(size());
   strain_lambda = Eigen::VectorXd::Zero(strains());
   place_lambda = Eigen::Matrix3Xd::Zero(3, places());
+  strain_impulse = Eigen::Matrix3Xd::Zero(3, strains());
 }
 
 void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
@@ -172,7 +173,10 @@ void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
       p[0] -= weight[e] * p0, p[1] -= weight[e] * p1, p[2] -= weight[e] * p2;
     }
   }
-  for (int r = 0; r < strains(); ++r) strain_lambda[r] += scale[r] * solution[r];
+  for (int r = 0; r < strains(); ++r) {
+    strain_lambda[r] += scale[r] * solution[r];
+    strain_impulse.col(r) += solution[r] * direction.col(r);
+  }
   for (int i = strains(); i < size(); ++i)
     place_lambda((i - strains()) % 3, (i - strains()) / 3) += scale[i] * solution[i];
 }
@@ -192,6 +196,7 @@ ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t
   for (int p = 0; p < s.places(); ++p) s.targets.col(p) = s.rows.place[p].target(t);
   s.strain_lambda.setZero();
   s.place_lambda.setZero();
+  s.strain_impulse.setZero();
 
   ProjectionReport report;
   double best = std::numeric_limits<double>::infinity();
@@ -215,6 +220,7 @@ ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t
 
 const Eigen::VectorXd& FastProjection::strain_multipliers() const { return impl_->strain_lambda; }
 const Eigen::Matrix3Xd& FastProjection::place_multipliers() const { return impl_->place_lambda; }
+const Eigen::Matrix3Xd& FastProjection::strain_impulses() const { return impl_->strain_impulse; }
 const ConstraintRows& FastProjection::rows() const { return impl_->rows; }
 const ProjectionOptions& FastProjection::options() const { return impl_->options; }
 std::size_t FastProjection::factor_nonzeros() const { return impl_->factor ? impl_->factor->factor_nonzeros() : 0; }

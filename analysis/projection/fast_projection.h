@@ -13,7 +13,9 @@ namespace toile {
 struct ProjectionOptions {
   double tolerance = 0.01;        // largest |C| of a strain row that counts as met
   double place_tolerance = 1e-9;  // m, of place rows
-  double regularisation = 1e-4;   // added to the unit diagonal of the scaled strain rows
+  // Added to the unit diagonal of the scaled strain rows. Example 4.1(a) without drag: energy never rises for 3e-4 to 1e-3
+  // at every step size tried; by 0.2 % of the work of gravity at 1e-4, by 70 % at 1e-6 and below.
+  double regularisation = 5e-4;
   int min_iterations = 1;         // projecting at least once a step is smooth in dt
   int max_iterations = 50;
 };
@@ -41,7 +43,7 @@ class FastProjection {
   FastProjection& operator=(FastProjection&&) noexcept;
 
   // Corrects x (free nodes) at time t: M (x_after - x_before) = -sum over iterations of J^T d lambda. Iterates until the
-  // tolerances are met, `max_iterations` are spent, or five iterations in a row gain nothing (constraints that
+  // tolerances are met, `max_iterations` are spent, or fifteen iterations in a row gain nothing (constraints that
   // contradict each other; going on would only pile up multipliers).
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t);
 
@@ -49,6 +51,9 @@ class FastProjection {
   // divided by dt^2 they are the constraint forces' quadrature weights [N m, N].
   const Eigen::VectorXd& strain_multipliers() const;
   const Eigen::Matrix3Xd& place_multipliers() const;
+  // Multiplier times tangent, summed over the iterations with the tangents of each [kg m]: control point I was pushed by
+  // -d_I times its column. What a reaction needs; lambda y at the end differs from it by the move of the last step.
+  const Eigen::Matrix3Xd& strain_impulses() const;
   const ConstraintRows& rows() const;
   const ProjectionOptions& options() const;
   std::size_t factor_nonzeros() const;
