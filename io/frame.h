@@ -28,10 +28,10 @@ struct FramePanel {
   const TrimmedSurface* face = nullptr;         // its loops; parameters agree with `surface`
   const TrimmedTriangles* triangles = nullptr;  // parameters agree with `surface`
   FrameFields fields;
-  Eigen::Matrix3Xd velocity;                    // of the control points [m/s], as the net; empty: not known
-  std::vector<bool> carries_cloth;              // per control point; empty: all do
+  Eigen::Matrix3Xd velocity;        // of the control points [m/s], as the net; empty: not known
+  std::vector<bool> carries_cloth;  // per control point; empty: all do
   std::span<const ConstraintPoint> points;
-  std::vector<Eigen::Vector2d> point_strain;    // weft, warp at `points`; empty: not known
+  std::vector<Eigen::Vector2d> point_strain;  // weft, warp at `points`; empty: not known
 };
 
 struct Frame {
@@ -40,8 +40,8 @@ struct Frame {
   std::span<const FramePanel> panels;
 };
 
-// Frames arrive once, in order (std::logic_error otherwise). A failed write throws OutputError; files appear whole or not
-// at all, and an index never names a file that is not there.
+// Frames arrive once, in order (std::logic_error otherwise). A failed write throws OutputError; files appear whole or
+// not at all, and an index never names a file that is not there.
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
