@@ -18,18 +18,18 @@ namespace toile {
 // Unset: the file's own knots. (design.md, "Refinement")
 struct InspectOptions {
   std::optional<int> degree;
-  std::optional<double> span;   // m, largest span length
-  std::optional<int> spans;     // per direction
-  bool select_rows = true;      // say which points the projection takes, for the default fabric and no pins
+  std::optional<double> span;  // m, largest span length
+  std::optional<int> spans;    // per direction
+  bool select_rows = true;     // say which points the projection takes, for the default fabric and no pins
 };
 
 struct InspectedPanel {
-  TrimmedSurface face;                  // refined as asked, loops valid
+  TrimmedSurface face;  // refined as asked, loops valid
   TrimTopology topology;
   std::vector<ConstraintPoint> points;
-  PanelMeasure measure;                 // unit of the net
-  int active_control_points = 0;        // their support meets the material
-  std::vector<double> gaps;             // per loop as read, before repair; largest, parameter plane
+  PanelMeasure measure;           // unit of the net
+  int active_control_points = 0;  // their support meets the material
+  std::vector<double> gaps;       // per loop as read, before repair; largest, parameter plane
   std::vector<LoopRepair> repairs;
   std::vector<std::string> warnings;
 };
@@ -37,8 +37,8 @@ struct InspectedPanel {
 struct Inspection {
   std::string file, unit, exporter;
   std::map<int, int> entities;
-  std::vector<LedgerEntry> ledger;      // what was converted or quarantined
-  std::vector<std::string> warnings;    // of the file, then of the panels
+  std::vector<LedgerEntry> ledger;    // what was converted or quarantined
+  std::vector<std::string> warnings;  // of the file, then of the panels
   std::vector<InspectedPanel> panels;
 };
 
