@@ -298,7 +298,7 @@ Build build(Scene scene) {
   }
   for (const OutputPoint& point : result.scene.points) {
     const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(point.panel))];
-    if (!contains(panel.face, panel.topology, point.uv)) {
+    if (!in_material(panel.face, panel.topology, point.uv)) {
       throw GeometryError(fmt::format("{}: output point ({}, {}) is not in the material of panel '{}'", point.where,
                                       point.uv.x(), point.uv.y(), panel.name));
     }

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "geometry/error.h"
+#include "geometry/measure.h"
 #include "geometry/quadrature_rule.h"
 
 namespace toile {
@@ -169,6 +170,19 @@ void add_edge(const Edge& edge, bool clamp, const NurbsSurface& surface, std::ve
 
 }  // namespace
 
+bool in_material(const TrimmedSurface& face, const TrimTopology& topology, const Eigen::Vector2d& uv) {
+  const Interval u = face.surface.u().domain(), v = face.surface.v().domain();
+  if (!u.contains(uv.x()) || !v.contains(uv.y())) return false;
+  if (contains(face, topology, uv)) return true;
+  const double near = 1e-9 * std::hypot(u.length(), v.length());
+  for (const TrimLoop& loop : face.loops) {
+    for (const TrimCurve& trim : loop.curves) {
+      if (closest_point<2>(trim.curve, uv).distance <= near) return true;
+    }
+  }
+  return false;
+}
+
 HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, const std::string& who) {
   const NurbsSurface& surface = panel.rest;
   const int n_u = surface.count_u(), n_v = surface.count_v();
@@ -222,7 +236,7 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
         throw GeometryError(fmt::format("{}: ({}, {}) lies outside panel '{}', whose domain is [{}, {}] x [{}, {}]", who,
                                         at.uv.x(), at.uv.y(), panel.name, du.min, du.max, dv.min, dv.max));
       }
-      if (!contains(panel.face, panel.topology, at.uv)) {
+      if (!in_material(panel.face, panel.topology, at.uv)) {
         throw GeometryError(
             fmt::format("{}: ({}, {}) of panel '{}' is trimmed away", who, at.uv.x(), at.uv.y(), panel.name));
       }

@@ -1,0 +1,303 @@
+#include "pipeline/cli.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/error.h"
+#include "io/file.h"
+#include "io/iges.h"
+#include "pipeline/console.h"
+#include "pipeline/drape.h"
+#include "pipeline/inspect.h"
+#include "pipeline/scene.h"
+#include "pipeline/templates.h"
+#include "pipeline/units.h"
+#include "pipeline/version.h"
+
+namespace toile {
+namespace {
+
+// A command line that parses but makes no sense.
+struct UsageError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+struct Common {
+  bool quiet = false, verbose = false, json = false, no_progress = false, overwrite = false;
+  std::string colour = "auto";
+  int threads = 1;
+};
+
+void add_common(CLI::App& app, Common& common) {
+  app.add_flag("-q,--quiet", common.quiet, "Errors only");
+  app.add_flag("-v,--verbose", common.verbose, "Say more");
+  app.add_flag("--json", common.json, "Results as JSON on stdout");
+  app.add_flag("--no-progress", common.no_progress, "No progress line");
+  app.add_flag("--overwrite", common.overwrite, "Replace files of a former run");
+  app.add_option("--color", common.colour, "auto or never")->check(CLI::IsMember({"auto", "never"}));
+  app.add_option("--threads", common.threads, "Threads; this version uses one")->check(CLI::Range(1, 1));
+}
+
+struct DrapeArguments {
+  std::string input, directory;
+  std::vector<std::string> settings, pins;
+  std::string until, fabric, span;
+  int degree = 0;
+  bool dry = false;
+};
+
+struct InspectArguments {
+  std::string input, svg, span;
+  int degree = 0, spans = 0;
+};
+
+double length_option(const std::string& text, const char* option) {
+  try {
+    const double length = parse_quantity(text, dimension::length);
+    if (length > 0) return length;
+  } catch (const InputError& error) {
+    throw UsageError(fmt::format("{}: {}", option, error.what()));
+  }
+  throw UsageError(fmt::format("{} must be positive", option));
+}
+
+Scene scene_of(const DrapeArguments& a) {
+  std::vector<std::string> settings = a.settings;
+  for (const std::string& s : settings) {
+    if (s.find('=') == std::string::npos) throw UsageError(fmt::format("--set {}: expected key=value", s));
+  }
+  if (!a.until.empty()) settings.push_back("solver.until=" + a.until);
+  const bool scene_file = std::filesystem::path(a.input).extension() == ".toml";
+  if (scene_file) {
+    if (!a.pins.empty() || !a.fabric.empty() || !a.span.empty() || a.degree > 0) {
+      throw UsageError("--pin, --fabric, --span and --degree are for panel files; in a scene use its keys or --set");
+    }
+    return read_scene(a.input, settings);
+  }
+  QuickScene quick;
+  quick.file = a.input;
+  quick.pins = a.pins;
+  if (a.pins.empty()) throw UsageError("a panel file needs at least one --pin, such as --pin curve:0,2");
+  for (const std::string& pin : a.pins) {
+    try {
+      parse_address(pin);
+    } catch (const InputError& error) {
+      throw UsageError(fmt::format("--pin: {}", error.what()));
+    }
+  }
+  if (!a.fabric.empty()) {
+    const auto presets = fabric_presets();
+    if (std::ranges::find(presets, a.fabric, &FabricPreset::name) == presets.end()) {
+      throw UsageError(fmt::format("--fabric: no preset is called '{}'; see toile presets", a.fabric));
+    }
+    quick.fabric = a.fabric;
+  }
+  if (a.degree > 0) quick.degree = a.degree;
+  if (!a.span.empty()) quick.span = length_option(a.span, "--span");
+  return quick_scene(quick, settings);
+}
+
+int run_drape(const DrapeArguments& a, const Common& common, Console& console) {
+  Scene scene = scene_of(a);
+  if (a.dry) return dry_run(std::move(scene), common.json, console);
+  DrapeOptions options;
+  if (!a.directory.empty()) options.directory = a.directory;
+  options.overwrite = common.overwrite;
+  options.json = common.json;
+  return drape(std::move(scene), options, console);
+}
+
+int run_inspect(const InspectArguments& a, const Common& common, Console& console) {
+  InspectOptions options;
+  if (a.degree > 0) options.degree = a.degree;
+  if (a.spans > 0) options.spans = a.spans;
+  if (!a.span.empty()) options.span = length_option(a.span, "--span");
+  const Inspection inspection = inspect(read_iges(a.input), options);
+  if (!a.svg.empty()) {
+    write_file(a.svg, inspect_svg(inspection));
+    console.note("wrote " + a.svg);
+  }
+  if (common.json) {
+    fmt::print("{}\n", inspect_json(inspection).dump(1));
+  } else {
+    fmt::print("{}", inspect_text(inspection));
+  }
+  return exit_ok;
+}
+
+int run_roundtrip(const std::string& input, bool rewrite, const Common& common) {
+  const RoundtripReport r = roundtrip(read_iges(input), rewrite ? IgesMode::rewrite : IgesMode::replay);
+  if (common.json) {
+    const nlohmann::ordered_json out = {{"file", input},
+                                        {"mode", rewrite ? "rewrite" : "replay"},
+                                        {"exact", r.exact()},
+                                        {"faces", r.faces},
+                                        {"faces_lost", r.faces_lost},
+                                        {"entities", r.entities},
+                                        {"entities_lost", r.entities_lost},
+                                        {"knots_equal", r.knots_equal},
+                                        {"weights_equal", r.weights_equal},
+                                        {"points_equal", r.points_equal},
+                                        {"parameter_curves_equal", r.parameter_curves_equal},
+                                        {"differences", r.differences}};
+    fmt::print("{}\n", out.dump(2));
+  } else {
+    fmt::print("{}: {} of {} faces, {} of {} entities kept; knots {}, weights {}, control points {}, parameter curves {}\n",
+               input, r.faces - r.faces_lost, r.faces, r.entities - r.entities_lost, r.entities,
+               r.knots_equal ? "equal" : "DIFFER", r.weights_equal ? "equal" : "DIFFER",
+               r.points_equal ? "equal" : "DIFFER", r.parameter_curves_equal ? "equal" : "DIFFER");
+    for (const std::string& difference : r.differences) fmt::print("  {}\n", difference);
+  }
+  return r.exact() ? exit_ok : exit_check;
+}
+
+int run_init(const std::string& name, const std::string& directory, const Common& common, Console& console) {
+  if (name.empty()) {
+    for (const SceneTemplate& t : scene_templates()) fmt::print("{:8} {}\n", t.name, t.about);
+    return exit_ok;
+  }
+  const auto templates = scene_templates();
+  if (std::ranges::find(templates, name, &SceneTemplate::name) == templates.end()) {
+    throw UsageError(fmt::format("no template is called '{}'; `toile init` lists them", name));
+  }
+  const std::filesystem::path folder = directory.empty() ? std::filesystem::path(name) : std::filesystem::path(directory);
+  const std::vector<TemplateFile> files = scene_template(name);
+  for (const TemplateFile& file : files) {
+    if (!common.overwrite && std::filesystem::exists(folder / file.name)) {
+      throw OutputError(fmt::format("{} exists; give --overwrite to replace it", (folder / file.name).string()));
+    }
+  }
+  for (const TemplateFile& file : files) write_file(folder / file.name, file.bytes);
+  console.note(fmt::format("wrote {0}; now: toile drape {0}", (folder / "scene.toml").string()));
+  return exit_ok;
+}
+
+int run_presets(const Common& common) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (const FabricPreset& p : fabric_presets()) {
+    const Fabric& f = p.fabric;
+    if (common.json) {
+      out.push_back({{"name", p.name},
+                     {"about", p.about},
+                     {"density", f.density},
+                     {"thickness", f.thickness},
+                     {"membrane", {{"weft", f.membrane.weft}, {"warp", f.membrane.warp}, {"shear", f.membrane.shear}}},
+                     {"bending", {{"b0", f.bending.b0}, {"kappa0", f.bending.kappa0}, {"kappa_reg", f.bending.kappa_reg}}},
+                     {"drag", f.drag},
+                     {"friction", f.friction}});
+    } else {
+      fmt::print("{:10} {}: {:.4g} kg/m2, {:.4g} N/m, B0 {:.2g} N m\n", p.name, p.about, f.density, f.membrane.weft, f.bending.b0);
+    }
+  }
+  if (common.json) fmt::print("{}\n", out.dump(2));
+  return exit_ok;
+}
+
+}  // namespace
+
+int run_program(int argc, char** argv) {
+  CLI::App app{"From garment panel to draped NURBS", "toile"};
+  app.set_version_flag("--version", version());
+  app.require_subcommand(1);
+  Common common;
+
+  DrapeArguments drape_arguments;
+  CLI::App* drape_command = app.add_subcommand("drape", "Drape a scene, or a panel file held by --pin");
+  drape_command->add_option("SCENE", drape_arguments.input, "scene.toml or panel.igs")->required();
+  drape_command->add_option("-o,--output", drape_arguments.directory, "Directory of the results (default: out/<scene name>)");
+  drape_command->add_option("--set", drape_arguments.settings, "key.path=value, any TOML value (panel.0.grain_deg=45)")
+      ->take_all()
+      ->allow_extra_args(false);
+  drape_command->add_option("--until", drape_arguments.until, "Simulated time, s or with a unit");
+  drape_command->add_flag("--dry-run", drape_arguments.dry, "Say step, time and memory; run nothing");
+  drape_command->add_option("--pin", drape_arguments.pins, "Panel files: what is held, such as curve:0,2; may repeat")
+      ->take_all()
+      ->allow_extra_args(false);
+  drape_command->add_option("--degree", drape_arguments.degree, "Panel files: degree")->check(CLI::Range(2, 5));
+  drape_command->add_option("--span", drape_arguments.span, "Panel files: longest knot span (\"20 mm\")");
+  drape_command->add_option("--fabric", drape_arguments.fabric, "Panel files: a preset");
+
+  InspectArguments inspect_arguments;
+  CLI::App* inspect_command = app.add_subcommand("inspect", "Entities, loops, cells and constraint points of a panel file");
+  inspect_command->add_option("FILE", inspect_arguments.input)->required();
+  inspect_command->add_option("--svg", inspect_arguments.svg, "Draw the panels");
+  inspect_command->add_option("--degree", inspect_arguments.degree, "Degree")->check(CLI::Range(1, 5));
+  auto* span = inspect_command->add_option("--span", inspect_arguments.span, "Longest knot span (\"20 mm\")");
+  inspect_command->add_option("--spans", inspect_arguments.spans, "Spans per direction")->check(CLI::Range(1, 10000))->excludes(span);
+
+  std::string roundtrip_input;
+  bool rewrite = false;
+  CLI::App* roundtrip_command = app.add_subcommand("roundtrip", "Read, write, read: is everything kept?");
+  roundtrip_command->add_option("FILE", roundtrip_input)->required();
+  roundtrip_command->add_flag("--rewrite", rewrite, "Make every known record anew instead of replaying it");
+
+  DrapeArguments check_arguments;
+  CLI::App* check_command = app.add_subcommand("check", "Validate a scene with its panels, without running");
+  check_command->add_option("SCENE", check_arguments.input)->required();
+  check_command->add_option("--set", check_arguments.settings, "key.path=value")->take_all()->allow_extra_args(false);
+
+  std::string template_name, template_directory;
+  CLI::App* init_command = app.add_subcommand("init", "Write a scene to start from; without a name, list them");
+  init_command->add_option("TEMPLATE", template_name);
+  init_command->add_option("-o,--output", template_directory, "Folder (default: the template's name)");
+
+  CLI::App* presets_command = app.add_subcommand("presets", "Fabrics that need no table in the scene");
+
+  for (CLI::App* command : {drape_command, inspect_command, roundtrip_command, check_command, init_command, presets_command}) {
+    add_common(*command, common);
+  }
+
+  Console console;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? exit_ok : exit_usage;
+  }
+  console.quiet = common.quiet;
+  console.verbose = common.verbose;
+  console.progress = !common.no_progress;
+  console.detect(common.colour);
+  try {
+    if (*drape_command) return run_drape(drape_arguments, common, console);
+    if (*inspect_command) return run_inspect(inspect_arguments, common, console);
+    if (*roundtrip_command) return run_roundtrip(roundtrip_input, rewrite, common);
+    if (*check_command) {
+      if (std::filesystem::path(check_arguments.input).extension() != ".toml") throw UsageError("check takes a scene.toml");
+      return check_scene(scene_of(check_arguments), common.json, console);
+    }
+    if (*init_command) return run_init(template_name, template_directory, common, console);
+    if (*presets_command) return run_presets(common);
+  } catch (const UsageError& error) {
+    console.error(error.what());
+    return exit_usage;
+  } catch (const InputError& error) {
+    console.error(error.what());
+    return exit_input;
+  } catch (const GeometryError& error) {
+    console.error(error.what());
+    return exit_geometry;
+  } catch (const SolverError& error) {
+    console.error(error.what());
+    return exit_solver;
+  } catch (const OutputError& error) {
+    console.error(error.what());
+    return exit_output;
+  } catch (const std::bad_alloc&) {
+    console.error("out of memory");
+    return exit_internal;
+  } catch (const std::exception& error) {
+    console.error(fmt::format("internal error: {}", error.what()));
+    return exit_internal;
+  }
+  return exit_internal;
+}
+
+}  // namespace toile

@@ -1,0 +1,224 @@
+#include "pipeline/drape.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "geometry/error.h"
+#include "io/file.h"
+#include "pipeline/build.h"
+#include "pipeline/cli.h"
+#include "pipeline/output.h"
+#include "pipeline/run.h"
+#include "pipeline/version.h"
+
+namespace toile {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+volatile std::sig_atomic_t interrupted = 0;
+void on_interrupt(int) { interrupted = 1; }
+
+// SIGINT asks the run to finish while this lives.
+class InterruptGuard {
+ public:
+  InterruptGuard() {
+    interrupted = 0;
+    previous_ = std::signal(SIGINT, on_interrupt);
+  }
+  ~InterruptGuard() { std::signal(SIGINT, previous_); }
+
+ private:
+  void (*previous_)(int) = nullptr;
+};
+
+int exit_code(RunExit exit) {
+  switch (exit) {
+    case RunExit::ok: return exit_ok;
+    case RunExit::solver_failed: return exit_solver;
+    case RunExit::check_failed: return exit_check;
+    case RunExit::interrupted: return exit_interrupted;
+  }
+  return exit_internal;
+}
+
+std::string describe(const Build& build, std::size_t k) {
+  const BuiltPanel& panel = build.panels[k];
+  const NurbsSurface& s = panel.face.surface;
+  const auto cells = [&](CellKind kind) { return std::ranges::count(panel.topology.cells, kind); };
+  return fmt::format("panel '{}': degree {} x {}, {} x {} control points, {} whole and {} cut cells, {} constraint points, "
+                     "{} control points extended",
+                     panel.name, s.u().degree(), s.v().degree(), s.count_u(), s.count_v(), cells(CellKind::inside),
+                     cells(CellKind::cut), panel.points.size(), panel.extended.size());
+}
+
+// Reasons of constraint points that the projection leaves out, with their number.
+std::map<std::string, int> unused(const System& system) {
+  std::map<std::string, int> reasons;
+  for (const auto& panel : system.points) {
+    for (const ConstraintPoint& point : panel) {
+      if (!point.used) ++reasons[point.why];
+    }
+  }
+  return reasons;
+}
+
+}  // namespace
+
+int drape(Scene scene, const DrapeOptions& options, Console& console) {
+  const std::filesystem::path directory = options.directory.value_or(std::filesystem::path("out") / scene.name);
+  const Build built = build(std::move(scene));
+  for (const std::string& warning : built.warnings) console.warning(warning);
+  for (std::size_t k = 0; k < built.panels.size(); ++k) console.detail(describe(built, k));
+  // What can be refused is refused before anything is written.
+  assemble(built, 0);
+  prepare_directory(directory, options.overwrite);
+
+  std::ofstream log(directory / "run.log");
+  log << "toile " << version() << "\nscene " << built.scene.path.string() << "\n";
+  for (std::size_t k = 0; k < built.panels.size(); ++k) log << describe(built, k) << "\n";
+  const bool twist_free =
+      std::ranges::all_of(built.scene.panels, [](const ScenePanel& p) { return p.fabric.bending.twist == 0; });
+  if (twist_free) log << "twist stiffness is 0, as in the paper's bending law\n";
+  for (const std::string& warning : built.warnings) log << "warning: " << warning << "\n";
+
+  FrameWriter writer(built, directory);
+  const Clock::time_point start = Clock::now();
+  const InterruptGuard guard;
+  RunHooks hooks;
+  hooks.stop = [] { return interrupted != 0; };
+  hooks.frame = [&](const RunFrame& frame) {
+    writer.write(frame);
+    log << fmt::format("frame {:4}  t = {:.6f} s  {:.2f} s of wall time\n", frame.number, frame.time, since(start)) << std::flush;
+  };
+  hooks.progress = [&](const RunProgress& p) {
+    const double wall = since(start);
+    console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {:.0f} s left", 100 * p.time / p.until, p.time,
+                             p.until, p.steps, p.dt, p.time > 0 ? wall * (p.until - p.time) / p.time : 0.0));
+  };
+  RunResult result = run(built, hooks);
+  console.end_live();
+
+  const Clock::time_point writing = Clock::now();
+  const Eigen::VectorXd q = control_points(*result.system, result.state);
+  write_file(directory / "draped.igs", draped_file(built, q).text);
+  if (built.scene.preview) {
+    // A picture is a courtesy: its failure doesn't spoil the run.
+    try {
+      const std::string png = writer.preview(*result.system, q);
+      if (!png.empty()) write_file(directory / "preview.png", png);
+    } catch (const Error& error) {
+      result.warnings.push_back(fmt::format("preview.png was not drawn: {}", error.what()));
+      console.warning(result.warnings.back());
+    }
+  }
+  if (result.unconverged_steps > 0) {
+    result.warnings.push_back(fmt::format("{} of {} steps did not meet the strain limit or the pins within {} iterations",
+                                          result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
+    console.warning(result.warnings.back());
+  }
+  const StateMeasures measures = measure(built, *result.system, result.state, result.dt_last);
+  const std::string report = report_json(built, result, measures, since(writing)).dump(2) + "\n";
+  write_file(directory / "report.json", report);
+  log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit), result.steps,
+                     result.redone_steps, result.dt_min, result.dt_max, result.wall_seconds);
+  if (!result.reason.empty()) log << result.reason << "\n";
+
+  console.note(fmt::format("{}: {:.3g} s in {} frames, {} steps of {:.2g} to {:.2g} s, {:.2f} s of wall time",
+                           built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,
+                           result.wall_seconds));
+  console.note(fmt::format("  strain at most {:.2g} weft, {:.2g} warp; mean {:.2g}, {:.2g}; at constraint points {:.2g}",
+                           measures.strain.max[0], measures.strain.max[1], measures.strain.mean_abs[0],
+                           measures.strain.mean_abs[1], measures.at_constraints_max));
+  console.note(fmt::format("  wrote {}", directory.string()));
+  if (options.json) std::fputs(report.c_str(), stdout);
+  if (result.exit == RunExit::ok) return exit_ok;
+  console.error(result.reason);
+  return exit_code(result.exit);
+}
+
+int dry_run(Scene scene, bool json, Console& console) {
+  const Build built = build(std::move(scene));
+  for (const std::string& warning : built.warnings) console.warning(warning);
+  std::unique_ptr<System> system = assemble(built, 0);
+  TimeStepBound bound = time_step_bound(*built.model, *system->map, system->dynamic.node_mass, built.start);
+  const double dt = planned_step(built.scene, bound);
+  long long steps = 0;
+  const std::vector<double> times = frame_times(built.scene);
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    steps += static_cast<long long>(std::ceil((times[k] - times[k - 1]) / dt * (1 - 1e-9)));
+  }
+  // A few steps, timed, on a copy of the start.
+  DynamicState state = state_from(*system, built.start, Eigen::VectorXd::Zero(built.start.size()), 0);
+  const int trial = static_cast<int>(std::min(5LL, steps));
+  const Clock::time_point start = Clock::now();
+  for (int k = 0; k < trial; ++k) step(system->dynamic, state, dt);
+  const double seconds = trial > 0 ? since(start) / trial * static_cast<double>(steps) : 0;
+  const std::size_t factor = system->projection ? system->projection->factor_nonzeros() : 0;
+  const double bytes = static_cast<double>(built.model->table_bytes() + 8 * factor) + 8.0 * 30 * static_cast<double>(built.start.size());
+  const std::map<std::string, int> reasons = unused(*system);
+  if (json) {
+    nlohmann::ordered_json out;
+    out["scene"] = built.scene.name;
+    out["dt"] = dt;
+    out["dt_bound"] = bound.dt;
+    out["limited_by"] = {{"panel", built.panels[static_cast<std::size_t>(bound.cell.panel)].name},
+                         {"cell", {bound.cell.i, bound.cell.j}},
+                         {"stiffness", bound.bending ? "bending" : "membrane"}};
+    out["steps"] = steps;
+    out["frames"] = times.size();
+    out["estimated_seconds"] = seconds;
+    out["estimated_bytes"] = bytes;
+    out["control_points"] = built.model->control_point_count();
+    out["degrees_of_freedom"] = 3 * system->map->nodes();
+    out["strain_rows"] = system->strain_rows;
+    out["pin_rows"] = 3 * system->place_rows;
+    out["unused_points"] = reasons;
+    out["warnings"] = built.warnings;
+    fmt::print("{}\n", out.dump(2));
+    return exit_ok;
+  }
+  fmt::print("step       {:.4g} s{}\n", dt, built.scene.dt ? " (as the scene says)" : "");
+  fmt::print("limited by {} in {}: stable below {:.4g} s\n", bound.bending ? "bending" : "membrane stiffness",
+             describe_cell(built, bound.cell), bound.dt);
+  fmt::print("steps      {} for {} frames up to {} s\n", steps, times.size(), built.scene.until);
+  fmt::print("time       about {:.2g} s, without frames\n", seconds);
+  fmt::print("memory     about {:.2g} MB\n", bytes / 1e6);
+  fmt::print("unknowns   {} of {} control points\n", 3 * system->map->nodes(), built.model->control_point_count());
+  fmt::print("rows       {} of strain, {} of pins\n", system->strain_rows, 3 * system->place_rows);
+  for (const auto& [why, count] : reasons) fmt::print("unused     {} constraint points: {}\n", count, why);
+  return exit_ok;
+}
+
+int check_scene(Scene scene, bool json, Console& console) {
+  const Build built = build(std::move(scene));
+  const std::unique_ptr<System> system = assemble(built, 0);
+  if (json) {
+    nlohmann::ordered_json out;
+    out["scene"] = built.scene.name;
+    out["valid"] = true;
+    out["panels"] = nlohmann::ordered_json::array();
+    for (const BuiltPanel& panel : built.panels) {
+      out["panels"].push_back({{"name", panel.name},
+                               {"control_points", {panel.face.surface.count_u(), panel.face.surface.count_v()}},
+                               {"constraint_points", panel.points.size()}});
+    }
+    out["warnings"] = built.warnings;
+    fmt::print("{}\n", out.dump(2));
+    return exit_ok;
+  }
+  for (const std::string& warning : built.warnings) console.warning(warning);
+  for (std::size_t k = 0; k < built.panels.size(); ++k) fmt::print("{}\n", describe(built, k));
+  fmt::print("{}: valid\n", built.scene.path.string());
+  return exit_ok;
+}
+
+}  // namespace toile

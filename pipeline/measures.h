@@ -1,0 +1,40 @@
+// Numbers of a state: strains and stresses over the cloth, at constraint points, at asked points, reactions.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "pipeline/system.h"
+
+namespace toile {
+
+// Points of a 50 x 50 grid (middles of equal parts of the domain) that lie in the material, weighted by rest area.
+struct GridSample {
+  int panel = 0;
+  Eigen::Vector2d uv;
+  double weight = 0;  // m2
+};
+std::vector<GridSample> grid_samples(const Build& build, int per_direction = 50);
+
+// Weft and warp of a strain or stress over the grid.
+struct Extremes {
+  Eigen::Vector2d min{0, 0}, max{0, 0}, mean{0, 0}, mean_abs{0, 0}, p999{0, 0};  // p999: 99.9 % of the area lies below
+};
+
+struct StateMeasures {
+  Extremes strain;        // E11, E22
+  Extremes nominal;       // N/m, membrane part
+  Extremes second_pk;     // N/m, membrane part
+  double at_constraints_max = 0;  // largest |E| of the strain rows taken (of all points where no limit is on)
+  double lowest = 0, highest = 0; // m, along the scene's "up" (against gravity; z without gravity)
+  double area = 0, mass = 0;      // m2, kg, of the rest
+  std::vector<Eigen::Vector3d> points;     // those that the scene asks for [m]
+  std::vector<Eigen::Vector3d> reactions;  // per pin: force on the cloth [N]
+};
+StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt);
+
+// Unit vector against gravity; z where there is none.
+Eigen::Vector3d up(const Scene& scene);
+
+}  // namespace toile

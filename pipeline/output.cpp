@@ -1,0 +1,179 @@
+#include "pipeline/output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "geometry/error.h"
+#include "io/file.h"
+#include "io/obj.h"
+#include "io/vtu.h"
+#include "pipeline/preview.h"
+#include "trimming/triangulation.h"
+
+namespace toile {
+namespace {
+
+struct OutputUnit {
+  std::string name;
+  double metres = 1;
+  double resolution = 1e-6;
+};
+
+// The first file's unit, where its name says all; a file with a model scale comes in metres.
+OutputUnit output_unit(const Build& build) {
+  static constexpr std::array<std::pair<const char*, double>, 11> units = {{{"MM", 1e-3},
+                                                                            {"M", 1},
+                                                                            {"INCH", 0.0254},
+                                                                            {"IN", 0.0254},
+                                                                            {"FT", 0.3048},
+                                                                            {"CM", 0.01},
+                                                                            {"KM", 1000},
+                                                                            {"UM", 1e-6},
+                                                                            {"MIL", 2.54e-5},
+                                                                            {"UIN", 2.54e-8},
+                                                                            {"MI", 1609.344}}};
+  const PanelFile& file = build.files.front();
+  const double metres = build.panels.front().source.metres_per_unit;
+  for (const auto& [name, size] : units) {
+    if (file.unit == name && std::abs(metres - size) <= 1e-12 * size) {
+      return {file.unit == "IN" ? "INCH" : file.unit, metres, file.resolution > 0 ? file.resolution : 1e-6};
+    }
+  }
+  return {"M", 1, 1e-9};
+}
+
+std::string base_name(const std::string& name) {
+  if (name.size() > flat_suffix.size() && name.ends_with(flat_suffix)) return name.substr(0, name.size() - flat_suffix.size());
+  return name;
+}
+
+}  // namespace
+
+IgesOutput draped_file(const Build& build, const Eigen::VectorXd& q) {
+  const OutputUnit unit = output_unit(build);
+  std::vector<OutputFace> faces;
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const BuiltPanel& panel = build.panels[k];
+    TrimmedSurface flat = panel.source;
+    for (TrimLoop& loop : flat.loops) {
+      for (TrimCurve& trim : loop.curves) trim.model.reset();  // the flat panel's, in the file's unit
+    }
+    flat.surface = panel.face.surface;
+    if (flat.metres_per_unit != unit.metres) {
+      flat.surface = flat.surface.with_points(flat.metres_per_unit / unit.metres * flat.surface.points());
+      flat.resolution *= flat.metres_per_unit / unit.metres;
+      flat.metres_per_unit = unit.metres;
+    }
+    TrimmedSurface draped = flat;
+    draped.surface = flat.surface.with_points(build.net(static_cast<int>(k), q) / unit.metres);
+    const std::string name = base_name(panel.name);
+    flat.name = name + std::string(flat_suffix);
+    draped.name = name + std::string(draped_suffix);
+    faces.push_back({flat, flat.name, 1, std::array<double, 3>{0.6, 0.6, 0.6}});
+    faces.push_back({draped, draped.name, 2, std::array<double, 3>{0.2, 0.4, 0.8}});
+  }
+  IgesHeader header;
+  header.product = build.scene.name;
+  header.unit = unit.name;
+  header.resolution = unit.resolution;
+  return format_iges(faces, header);
+}
+
+struct FrameWriter::Impl {
+  const Build& build;
+  std::filesystem::path frames;
+  std::vector<TrimmedTriangles> triangles;
+  std::vector<std::unique_ptr<FrameSink>> sinks;
+  bool iges = false;
+
+  // Deformed panels with fields; surfaces are kept alive beside them.
+  struct Shown {
+    std::vector<NurbsSurface> surfaces;
+    std::vector<FramePanel> panels;
+  };
+  Shown show(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd* velocity) const {
+    Shown shown;
+    shown.surfaces.reserve(build.panels.size());
+    const ShellModel& model = *build.model;
+    for (std::size_t k = 0; k < build.panels.size(); ++k) {
+      const int index = static_cast<int>(k);
+      const BuiltPanel& built = build.panels[k];
+      shown.surfaces.push_back(build.rest(index).with_points(build.net(index, q)));
+      FramePanel panel;
+      panel.name = built.name;
+      panel.surface = &shown.surfaces.back();
+      panel.face = &built.face;
+      panel.triangles = &triangles[k];
+      for (const Eigen::Vector2d& uv : triangles[k].uv) {
+        const ShellState at = model.state(index, uv.x(), uv.y(), q);
+        panel.fields.strain.push_back(at.strain);
+        panel.fields.curvature.push_back(at.curvature);
+        panel.fields.second_pk.push_back(at.second_pk);
+        panel.fields.nominal.push_back(at.nominal);
+      }
+      if (velocity) panel.velocity = build.net(index, *velocity);
+      panel.carries_cloth = built.carries_cloth;
+      panel.points = system.points[k];
+      for (const ConstraintPoint& point : system.points[k]) {
+        panel.point_strain.emplace_back(model.state(index, point.u, point.v, q).strain.head<2>());
+      }
+      shown.panels.push_back(std::move(panel));
+    }
+    return shown;
+  }
+};
+
+FrameWriter::FrameWriter(const Build& build, std::filesystem::path directory)
+    : impl_(new Impl{build, std::move(directory) / "frames", {}, {}, false}) {
+  for (const BuiltPanel& panel : build.panels) impl_->triangles.push_back(triangulate(panel.face, panel.topology));
+  for (const FrameFormat format : build.scene.formats) {
+    switch (format) {
+      case FrameFormat::vtu: impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name)); break;
+      case FrameFormat::obj: impl_->sinks.push_back(std::make_unique<ObjSink>(impl_->frames)); break;
+      case FrameFormat::iges: impl_->iges = true; break;
+    }
+  }
+}
+
+FrameWriter::~FrameWriter() = default;
+
+void FrameWriter::write(const RunFrame& frame) {
+  if (impl_->iges) {
+    write_file(impl_->frames / fmt::format("frame_{:04}.igs", frame.number), draped_file(impl_->build, frame.q).text);
+  }
+  if (impl_->sinks.empty()) return;
+  const Impl::Shown shown = impl_->show(frame.system, frame.q, &frame.velocity);
+  for (const auto& sink : impl_->sinks) sink->write({frame.number, frame.time, shown.panels});
+}
+
+std::string FrameWriter::preview(const System& system, const Eigen::VectorXd& q) const {
+  if (!preview_available()) return {};
+  const Impl::Shown shown = impl_->show(system, q, nullptr);
+  PreviewOptions options;
+  options.up = up(impl_->build.scene);
+  options.title = impl_->build.scene.name;
+  return preview_png({0, 0, shown.panels}, options);
+}
+
+void prepare_directory(const std::filesystem::path& directory, bool overwrite) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::exists(directory, error)) {
+    if (!fs::is_directory(directory)) throw OutputError(fmt::format("{} is not a directory", directory.string()));
+    if (!fs::is_empty(directory) && !overwrite) {
+      throw OutputError(fmt::format("{} is not empty; give --overwrite to replace a former run, or another -o DIR",
+                                    directory.string()));
+    }
+    for (const char* name : {"draped.igs", "report.json", "report.html", "preview.png", "run.log", "checkpoint", "frames"}) {
+      fs::remove_all(directory / name, error);
+      if (error) throw OutputError(fmt::format("{}: {}", (directory / name).string(), error.message()));
+    }
+  }
+  fs::create_directories(directory, error);
+  if (error) throw OutputError(fmt::format("{}: {}", directory.string(), error.message()));
+}
+
+}  // namespace toile

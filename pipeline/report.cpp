@@ -1,0 +1,103 @@
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/output.h"
+#include "pipeline/version.h"
+
+namespace toile {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json array(const Eigen::Ref<const Eigen::VectorXd>& x) {
+  Json result = Json::array();
+  for (const double value : x) result.push_back(value);
+  return result;
+}
+
+Json stress(const Extremes& e) {
+  return {{"min_weft", e.min[0]}, {"max_weft", e.max[0]}, {"mean_weft", e.mean[0]},
+          {"min_warp", e.min[1]}, {"max_warp", e.max[1]}, {"mean_warp", e.mean[1]}};
+}
+
+Json measured(double value, const char* unit) { return {{"value", value}, {"unit", unit}}; }
+
+}  // namespace
+
+Json report_json(const Build& build, const RunResult& run, const StateMeasures& m, double write_seconds) {
+  const Scene& scene = build.scene;
+  const System& system = *run.system;
+  Json report;
+  report["scene"] = scene.name;
+  report["version"] = version();
+  report["exit"] = name(run.exit);
+  if (run.exit != RunExit::ok) report["reason"] = run.reason;
+  report["frames"] = run.frames;
+  report["steps"] = run.steps;
+  report["redone_steps"] = run.redone_steps;
+  report["simulated_seconds"] = run.time;
+  const double computing = run.wall_seconds - run.frame_seconds;
+  report["wall_seconds"] = computing;
+  report["wall_seconds_per_frame"] = run.time > 0 ? computing / (run.time * 30) : 0.0;
+  report["seconds"] = {{"read", build.read_seconds},
+                       {"trim", build.trim_seconds},
+                       {"force", run.force_seconds},
+                       {"projection", run.projection_seconds},
+                       {"time_step", run.bound_seconds},
+                       {"contact", 0.0},
+                       {"write", run.frame_seconds + write_seconds}};
+  report["dt"] = {{"min", run.dt_min}, {"max", run.dt_max}};
+  std::size_t points = 0, used = 0;
+  for (const auto& panel : system.points) {
+    points += panel.size();
+    used += static_cast<std::size_t>(std::ranges::count(panel, true, &ConstraintPoint::used));
+  }
+  report["degrees_of_freedom"] = 3 * system.map->nodes();
+  report["control_points"] = build.model->control_point_count();
+  report["constraint_points"] = points;
+  report["constraint_points_used"] = scene.strain_limit.on ? used : 0;
+  report["constraint_rows"] = {{"strain", system.strain_rows}, {"pins", 3 * system.place_rows}};
+  report["strain"] = {{"max_weft", m.strain.max[0]},
+                      {"max_warp", m.strain.max[1]},
+                      {"min_weft", m.strain.min[0]},
+                      {"min_warp", m.strain.min[1]},
+                      {"p999_weft", m.strain.p999[0]},
+                      {"p999_warp", m.strain.p999[1]},
+                      {"mean_abs_weft", m.strain.mean_abs[0]},
+                      {"mean_abs_warp", m.strain.mean_abs[1]},
+                      {"at_constraints_max", m.at_constraints_max}};
+  report["points"] = Json::array();
+  for (std::size_t k = 0; k < m.points.size(); ++k) {
+    report["points"].push_back({{"panel", scene.points[k].panel}, {"uv", array(scene.points[k].uv)}, {"position", array(m.points[k])}});
+  }
+  report["reactions"] = Json::array();
+  for (std::size_t k = 0; k < m.reactions.size(); ++k) {
+    report["reactions"].push_back({{"pin", k}, {"panel", scene.pins[k].panel}, {"at", scene.pins[k].at.text}, {"force", array(m.reactions[k])}});
+  }
+  report["stress"] = stress(m.nominal);
+  report["stress"]["second_pk"] = stress(m.second_pk);
+  report["stress"]["part"] = system.strain_rows > 0 ? "membrane only: what the strain limit carries is not in it" : "whole";
+  const EnergyBalance& e = run.energy;
+  report["energy"] = {{"kinetic", e.kinetic},     {"membrane", e.membrane},       {"bending", e.bending},
+                      {"gravity", e.gravity},     {"dissipated", e.dissipated()}, {"loads_work", e.load_work},
+                      {"motion_work", e.motion_work}, {"injected", e.injected}};
+  report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
+                          {"iterations_max", run.iterations_max},
+                          {"unconverged_steps", run.unconverged_steps}};
+  report["contact"] = {{"max_penetration", 0.0}, {"min_distance", nullptr}};  // nothing touches in this version
+  report["seams"] = {{"max_gap", 0.0}};
+  Json stages = Json::array({"shell"});
+  if (system.projection) stages.push_back("projection");
+  report["stages"] = stages;
+  Json warnings = Json::array();
+  for (const std::string& w : build.warnings) warnings.push_back(w);
+  for (const std::string& w : run.warnings) warnings.push_back(w);
+  report["warnings"] = warnings;
+  report["measures"] = {{"area", measured(m.area, "m2")},
+                        {"mass", measured(m.mass, "kg")},
+                        {"lowest", measured(m.lowest, "m")},
+                        {"highest", measured(m.highest, "m")}};
+  return report;
+}
+
+}  // namespace toile

@@ -1,0 +1,292 @@
+#include "pipeline/run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <set>
+
+#include "geometry/error.h"
+
+namespace toile {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+constexpr double step_safety = 0.9;        // of the eigenvalue bound
+constexpr int steps_per_bound = 100;       // the bound costs some 40 forces
+constexpr int most_halvings = 10;
+constexpr double step_rise = 0.02, total_rise = 0.05;  // of the energy turned over
+
+// Kinetic energy that the velocity at the end of a step may hold beyond the projected one: half a step of the free
+// acceleration. (design.md, "Multipliers and velocity")
+double velocity_noise(const DynamicSystem& system, const DynamicState& state, double dt) {
+  double sum = 0;
+  for (Eigen::Index k = 0; k < system.node_mass.size(); ++k) {
+    sum += system.node_mass[k] * state.a.segment<3>(3 * k).squaredNorm();
+  }
+  return sum * dt * dt;
+}
+
+class Loop {
+ public:
+  Loop(const Build& build, const RunHooks& hooks) : build_(build), scene_(build.scene), hooks_(hooks) {}
+
+  RunResult operator()() {
+    const Clock::time_point start = Clock::now();
+    begin();
+    emit_frame();
+    for (const double target : targets()) {
+      while (result_.exit == RunExit::ok && result_.state.t < target) advance(target);
+      if (result_.exit != RunExit::ok) break;
+      release(target);
+      if (is_frame(target)) emit_frame();
+    }
+    if (result_.exit == RunExit::ok && !result_.last_projection.converged) report_limit();
+    result_.time = result_.state.t;
+    const Eigen::VectorXd moved = control_points(*result_.system, result_.state) - build_.start;
+    for (int i = 0; i < build_.model->control_point_count(); ++i) {
+      result_.energy.gravity -= build_.model->lumped_mass()[i] * scene_.gravity.dot(moved.segment<3>(3 * i));
+    }
+    result_.wall_seconds = since(start);
+    return std::move(result_);
+  }
+
+ private:
+  void begin() {
+    result_.system = assemble(build_, 0);
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(build_.start.size());
+    result_.state = state_from(*result_.system, build_.start, zero, 0);
+    result_.last_projection.converged = true;
+    Eigen::VectorXd force(build_.start.size());
+    const ShellEnergy elastic = build_.model->internal_force(build_.start, force);
+    result_.energy.membrane = elastic.membrane;
+    result_.energy.bending = elastic.bending;
+    result_.energy.start = elastic.total();
+    scale_ = elastic.total();
+    evaluate_bound();
+  }
+
+  std::vector<double> targets() const {
+    std::set<double> times;
+    for (const double t : frame_times(scene_)) times.insert(t);
+    for (const ScenePin& pin : scene_.pins) {
+      if (pin.release && *pin.release > 0 && *pin.release < scene_.until) times.insert(*pin.release);
+    }
+    times.erase(0.0);
+    return {times.begin(), times.end()};
+  }
+  bool is_frame(double t) const {
+    const std::vector<double> times = frame_times(scene_);
+    return std::ranges::find(times, t) != times.end();
+  }
+
+  void evaluate_bound() {
+    steps_since_bound_ = 0;
+    dt_scale_ = std::min(1.0, 2 * dt_scale_);
+    if (scene_.dt) return;
+    const Clock::time_point start = Clock::now();
+    const System& system = *result_.system;
+    result_.bound = time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, control_points(system, result_.state));
+    result_.bound_seconds += since(start);
+  }
+
+  void advance(double target) {
+    if (steps_since_bound_ >= steps_per_bound) evaluate_bound();
+    const double largest = dt_scale_ * planned_step(scene_, result_.bound);
+    const double left = target - result_.state.t;
+    // A remainder of rounding makes no step of its own.
+    const double count = std::max(1.0, std::ceil(left / largest * (1 - 1e-9)));
+    double dt = left / count;
+    if (!(dt > 0) || result_.state.t + dt == result_.state.t) {
+      fail(fmt::format("the step of {:.3g} s is too small to advance the time", dt));
+      return;
+    }
+    for (int halving = 0;; ++halving) {
+      DynamicState before = result_.state;
+      const StepReport report = step(result_.system->dynamic, result_.state, dt);
+      result_.force_seconds += report.force_seconds;
+      result_.projection_seconds += report.projection_seconds;
+      const std::string trouble = judge(report);
+      if (trouble.empty()) {
+        accept(report);
+        // The last step of a stretch ends on the target itself, not on a rounded sum.
+        if (count == 1 && halving == 0) result_.state.t = target;
+        if (halving > 0) steps_since_bound_ = 0;
+        break;
+      }
+      result_.state = std::move(before);
+      ++result_.redone_steps;
+      if (halving == most_halvings) {
+        fail(fmt::format("{}, even with a step of {:.3g} s", trouble, dt));
+        return;
+      }
+      dt /= 2;
+      dt_scale_ /= 2;
+    }
+    if (hooks_.progress) hooks_.progress({result_.state.t, scene_.until, dt, result_.steps, result_.frames});
+    if (hooks_.stop && hooks_.stop()) {
+      result_.exit = RunExit::interrupted;
+      result_.reason = "interrupted";
+    }
+  }
+
+  // Why a step can't be accepted; empty where it can.
+  std::string judge(const StepReport& report) {
+    if (!report.finite) return "the numbers are no longer finite";
+    const EnergyBalance& e = result_.energy;
+    const double now = report.kinetic + report.elastic.total();
+    const double work = e.load_work + e.drag_work + e.motion_work + report.load_work + report.drag_work + report.motion_work;
+    const double balance = now - e.start - work;
+    const double turned = std::max({scale_, std::abs(e.load_work + report.load_work), std::abs(e.motion_work + report.motion_work),
+                                    e.now()});
+    const double noise = velocity_noise(result_.system->dynamic, result_.state, report.dt);
+    if (balance - balance_ > step_rise * turned + noise) {
+      return fmt::format("the energy rises by {:.3g} J in a step without work that would explain it ({:.3g} J turned over)",
+                         balance - balance_, turned);
+    }
+    if (balance > total_rise * turned + noise) {
+      return fmt::format("the energy has risen by {:.3g} J without work that would explain it ({:.3g} J turned over)", balance,
+                         turned);
+    }
+    scale_ = turned;
+    balance_ = balance;
+    return {};
+  }
+
+  void accept(const StepReport& report) {
+    EnergyBalance& e = result_.energy;
+    e.kinetic = report.kinetic;
+    e.membrane = report.elastic.membrane;
+    e.bending = report.elastic.bending;
+    e.load_work += report.load_work;
+    e.drag_work += report.drag_work;
+    e.motion_work += report.motion_work;
+    e.injected = std::max(e.injected, balance_);
+    result_.dt_min = result_.steps == 0 ? report.dt : std::min(result_.dt_min, report.dt);
+    result_.dt_max = std::max(result_.dt_max, report.dt);
+    result_.dt_last = report.dt;
+    result_.last_projection = report.projection;
+    result_.iterations_sum += report.projection.iterations;
+    result_.iterations_max = std::max(result_.iterations_max, report.projection.iterations);
+    if (!report.projection.converged) ++result_.unconverged_steps;
+    ++result_.steps;
+    ++steps_since_bound_;
+  }
+
+  void release(double t) {
+    const bool any = std::ranges::any_of(scene_.pins, [&](const ScenePin& pin) { return pin.release && *pin.release == t; });
+    if (!any) return;
+    const Eigen::VectorXd q = control_points(*result_.system, result_.state);
+    const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
+    result_.system = assemble(build_, t);
+    result_.state = state_from(*result_.system, q, v, t);
+    // The released control points' kinetic energy joins the balance.
+    double kinetic = 0;
+    const DynamicSystem& dynamic = result_.system->dynamic;
+    for (Eigen::Index k = 0; k < dynamic.node_mass.size(); ++k) {
+      kinetic += 0.5 * dynamic.node_mass[k] * result_.state.v.segment<3>(3 * k).squaredNorm();
+    }
+    result_.energy.start += kinetic - result_.energy.kinetic;
+    result_.energy.kinetic = kinetic;
+    result_.last_projection.converged = true;
+    evaluate_bound();
+  }
+
+  void emit_frame() {
+    const Clock::time_point start = Clock::now();
+    const int number = result_.frames++;
+    if (!hooks_.frame) return;
+    const Eigen::VectorXd q = control_points(*result_.system, result_.state);
+    const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
+    hooks_.frame({number, result_.state.t, *result_.system, q, v});
+    result_.frame_seconds += since(start);
+  }
+
+  std::string worst_place() const {
+    const int row = result_.last_projection.worst_row;
+    if (!result_.system->projection || row < 0) return "at a pin";
+    const StrainRow& strain = result_.system->projection->rows().strain[static_cast<std::size_t>(row)];
+    const BuiltPanel& panel = build_.panels[static_cast<std::size_t>(strain.panel)];
+    const ConstraintPoint& point = panel.points[static_cast<std::size_t>(strain.point)];
+    return fmt::format("in {} at (u, v) = ({:.6g}, {:.6g}) of panel '{}'", strain.warp ? "warp" : "weft", point.u, point.v,
+                       panel.name);
+  }
+
+  void fail(const std::string& what) {
+    result_.exit = RunExit::solver_failed;
+    std::string where;
+    const System& system = *result_.system;
+    const Eigen::VectorXd q = control_points(system, result_.state);
+    if (q.allFinite()) {
+      const TimeStepBound bound = time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, q);
+      where = fmt::format("; the stiffest place is {} ({}), which needs steps below {:.3g} s", describe_cell(build_, bound.cell),
+                          bound.bending ? "bending" : "membrane", bound.dt);
+    }
+    if (result_.system->projection) {
+      where += fmt::format("; the largest strain violation is {:.3g} {}", result_.last_projection.strain_violation, worst_place());
+    }
+    result_.reason = fmt::format(
+        "at t = {:.6g} s {}{}. Use dt = \"auto\" or a smaller dt, a larger strain_limit.tolerance or regularisation, or look "
+        "for pins that contradict each other",
+        result_.state.t, what, where);
+  }
+
+  void report_limit() {
+    result_.exit = RunExit::check_failed;
+    const ProjectionReport& p = result_.last_projection;
+    result_.reason = fmt::format(
+        "the strain limit is not met at the end: {:.3g} {}, allowed {:.3g}; pins off by {:.3g} m; {} of {} steps did not "
+        "converge",
+        p.strain_violation, worst_place(), scene_.strain_limit.tolerance, p.place_violation, result_.unconverged_steps,
+        result_.steps);
+  }
+
+  const Build& build_;
+  const Scene& scene_;
+  const RunHooks& hooks_;
+  RunResult result_;
+  double dt_scale_ = 1, scale_ = 0, balance_ = 0;
+  int steps_since_bound_ = 0;
+};
+
+}  // namespace
+
+const char* name(RunExit exit) {
+  switch (exit) {
+    case RunExit::ok: return "ok";
+    case RunExit::solver_failed: return "solver";
+    case RunExit::check_failed: return "check";
+    case RunExit::interrupted: return "interrupted";
+  }
+  return "";
+}
+
+std::vector<double> frame_times(const Scene& scene) {
+  std::vector<double> times;
+  for (int k = 0;; ++k) {
+    const double t = k * scene.every;
+    if (t >= scene.until * (1 - 1e-9)) break;
+    times.push_back(t);
+  }
+  times.push_back(scene.until);
+  return times;
+}
+
+double planned_step(const Scene& scene, const TimeStepBound& bound) {
+  return scene.dt ? *scene.dt : std::min(step_safety * bound.dt, scene.every);
+}
+
+std::string describe_cell(const Build& build, const ShellModel::Cell& cell) {
+  const BuiltPanel& panel = build.panels[static_cast<std::size_t>(cell.panel)];
+  const KnotMesh& mesh = panel.topology.mesh;
+  const auto i = static_cast<std::size_t>(cell.i), j = static_cast<std::size_t>(cell.j);
+  return fmt::format("panel '{}', cell ({}, {}), u in [{:.6g}, {:.6g}], v in [{:.6g}, {:.6g}]", panel.name, cell.i, cell.j,
+                     mesh.u[i], mesh.u[i + 1], mesh.v[j], mesh.v[j + 1]);
+}
+
+RunResult run(const Build& build, const RunHooks& hooks) { return Loop(build, hooks)(); }
+
+}  // namespace toile
