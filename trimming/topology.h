@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "geometry/trimmed_surface.h"
+#include "trimming/spans.h"
 
 namespace toile {
 
@@ -38,7 +38,8 @@ enum class VertexKind : std::uint8_t { outside, border, inside };
 // A piece of the boundary of the material inside one cell, in the direction that has the material on its left.
 struct BoundaryPiece {
   int loop = -1, curve = -1;    // positions as in TrimEvent; -1: a straight piece of the cell's own border
-  double t0 = 0, t1 = 0;        // parameters on the curve as given; t0 > t1 where the loop traverses it backwards
+  double t0 = 0, t1 = 0;        // parameters on the curve as given; t0 > t1 where the loop traverses it backwards; the
+                                // curve's own knots may lie between them
   Eigen::Vector2d from{0, 0}, to{0, 0};
 };
 
@@ -65,10 +66,12 @@ struct TrimTopology {
   std::vector<CellKind> cells;        // mesh.cell(i,j)
   std::vector<VertexKind> vertices;   // mesh.vertex(i,j)
   std::vector<CutCell> cut_cells;     // ordered by mesh.cell
+  TrimSpans spans;                    // the Bezier spans of the trims, about which all this was decided
   PredicateCounts counts;
 };
 
-// The trims must have passed validate_loops. The knot lines are those of `surface.surface`.
+// The trims must have passed validate_loops; throws GeometryError where they are found open, crossing or not nested. The
+// knot lines are those of `surface.surface`.
 TrimTopology trace_trims(const TrimmedSurface& surface);
 
 // Is the parameter point in the material (border included)?

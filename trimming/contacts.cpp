@@ -1,0 +1,373 @@
+#include "trimming/contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "trimming/crossings.h"
+
+namespace toile {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+struct Box {
+  Vector2d min, max;
+};
+
+// A part of a span in the direction of its loop.
+struct Piece {
+  int loop = 0, link = 0;   // link: number of the span in the chain of its loop
+  double s0 = 0, s1 = 1;    // on that span, in the loop's direction
+  TrimSpan span;            // control points in the loop's direction
+  Box box;
+
+  int degree() const { return span.degree; }
+  Vector2d first() const { return span.first(); }
+  Vector2d last() const { return span.last(); }
+  double size() const { return (box.max - box.min).maxCoeff(); }
+  bool straight() const { return span.degree == 1; }
+};
+
+void set_box(Piece& piece) {
+  piece.box = {piece.first(), piece.first()};
+  for (int i = 1; i <= piece.degree(); ++i) {
+    piece.box.min = piece.box.min.cwiseMin(piece.span.point(i));
+    piece.box.max = piece.box.max.cwiseMax(piece.span.point(i));
+  }
+}
+
+std::pair<Piece, Piece> halves(const Piece& piece) {
+  Piece left = piece, right = piece;
+  const std::size_t n = static_cast<std::size_t>(piece.degree());
+  std::array<Eigen::Vector3d, max_degree + 1> d;
+  for (std::size_t i = 0; i <= n; ++i) {
+    const double w = piece.span.w[i];
+    d[i] = {piece.span.u[i] * w, piece.span.v[i] * w, w};
+  }
+  const auto store = [](TrimSpan& span, std::size_t i, const Eigen::Vector3d& h) {
+    span.u[i] = h.x() / h.z();
+    span.v[i] = h.y() / h.z();
+    span.w[i] = h.z();
+  };
+  for (std::size_t k = 1; k <= n; ++k) {
+    for (std::size_t i = 0; i + k <= n; ++i) d[i] = 0.5 * (d[i] + d[i + 1]);
+    store(left.span, k, d[0]);
+    if (k < n) store(right.span, n - k, d[n - k]);
+  }
+  right.span.u[0] = left.span.u[n];
+  right.span.v[0] = left.span.v[n];
+  right.span.w[0] = left.span.w[n];
+  left.s1 = right.s0 = 0.5 * (piece.s0 + piece.s1);
+  set_box(left);
+  set_box(right);
+  return {left, right};
+}
+
+// Every leg of the control polygon goes forward along the chord: the piece can't meet itself.
+bool forward(const Piece& piece) {
+  const Vector2d chord = piece.last() - piece.first();
+  for (int i = 0; i < piece.degree(); ++i) {
+    const Vector2d leg = piece.span.point(i + 1) - piece.span.point(i);
+    if (leg != Vector2d::Zero() && !(leg.dot(chord) > 0)) return false;
+  }
+  return true;
+}
+
+double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+class Finder {
+ public:
+  Finder(const std::vector<TrimLoop>& loops, const TrimSpans& spans) {
+    Vector2d min = Vector2d::Constant(std::numeric_limits<double>::infinity()), max = -min;
+    for (const TrimSpan& span : spans.all) {
+      for (int i = 0; i <= span.degree; ++i) {
+        min = min.cwiseMin(span.point(i));
+        max = max.cwiseMax(span.point(i));
+      }
+    }
+    // Both directions scaled by powers of two, which rounds nothing, to sizes between 1 and 2.
+    for (int axis = 0; axis < 2; ++axis) {
+      const double size = max[axis] - min[axis];
+      scale_[axis] = size > 0 ? std::ldexp(1.0, -std::ilogb(size)) : 1;
+    }
+    margin_ = 8 * epsilon * std::max((scale_.asDiagonal() * min).cwiseAbs().maxCoeff(),
+                                     (scale_.asDiagonal() * max).cwiseAbs().maxCoeff());
+    smallest_ = 8 * margin_;
+    for (std::size_t l = 0; l < loops.size(); ++l) add_loop(loops[l], static_cast<int>(l), spans);
+  }
+
+  std::vector<LoopContact> run() {
+    std::vector<int> order(pieces_.size());
+    for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<int>(k);
+    std::sort(order.begin(), order.end(), [this](int a, int b) {
+      const double x = piece(a).box.min.x(), y = piece(b).box.min.x();
+      return x != y ? x < y : a < b;
+    });
+    std::vector<int> active;
+    for (const int b : order) {
+      std::erase_if(active, [&](int a) { return piece(a).box.max.x() + margin_ < piece(b).box.min.x(); });
+      for (const int a : active) {
+        if (boxes_apart(piece(a).box, piece(b).box)) continue;
+        if (next_[static_cast<std::size_t>(a)] == b) {
+          joined(piece(a), piece(b));
+        } else if (next_[static_cast<std::size_t>(b)] == a) {
+          joined(piece(b), piece(a));
+        } else {
+          apart(piece(a), piece(b));
+        }
+      }
+      active.push_back(b);
+    }
+    return std::move(contacts_);
+  }
+
+ private:
+  const Piece& piece(int k) const { return pieces_[static_cast<std::size_t>(k)]; }
+
+  void add_loop(const TrimLoop& loop, int l, const TrimSpans& spans) {
+    std::vector<TrimSpan>& chain = chains_.emplace_back();
+    for (std::size_t c = 0; c < loop.curves.size(); ++c) {
+      const auto of = spans.of(l, static_cast<int>(c));
+      for (std::size_t k = 0; k < of.size(); ++k) {
+        TrimSpan span = of[loop.curves[c].reversed ? of.size() - 1 - k : k];
+        if (span.degenerate()) continue;
+        if (loop.curves[c].reversed) {
+          std::reverse(span.u.begin(), span.u.begin() + span.degree + 1);
+          std::reverse(span.v.begin(), span.v.begin() + span.degree + 1);
+          std::reverse(span.w.begin(), span.w.begin() + span.degree + 1);
+        }
+        for (std::size_t i = 0; i <= static_cast<std::size_t>(span.degree); ++i) {
+          span.u[i] *= scale_.x();
+          span.v[i] *= scale_.y();
+        }
+        chain.push_back(span);
+      }
+    }
+    std::vector<Piece> list;
+    for (std::size_t k = 0; k < chain.size(); ++k) {
+      Piece piece;
+      piece.loop = l;
+      piece.link = static_cast<int>(k);
+      piece.span = chain[k];
+      set_box(piece);
+      split_forward(piece, 0, list);
+    }
+    while (!list.empty() && list.size() < 3) {
+      std::vector<Piece> finer;
+      for (const Piece& piece : list) {
+        const auto [a, b] = halves(piece);
+        finer.push_back(a);
+        finer.push_back(b);
+      }
+      list = std::move(finer);
+    }
+    const std::size_t first = pieces_.size();
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      pieces_.push_back(list[k]);
+      next_.push_back(static_cast<int>(first + (k + 1) % list.size()));
+    }
+  }
+
+  void split_forward(const Piece& piece, int depth, std::vector<Piece>& out) {
+    if (depth == 30 || forward(piece)) {
+      out.push_back(piece);
+      return;
+    }
+    const auto [a, b] = halves(piece);
+    split_forward(a, depth + 1, out);
+    split_forward(b, depth + 1, out);
+  }
+
+  bool boxes_apart(const Box& a, const Box& b) const {
+    return a.max.x() + margin_ < b.min.x() || b.max.x() + margin_ < a.min.x() || a.max.y() + margin_ < b.min.y() ||
+           b.max.y() + margin_ < a.min.y();
+  }
+
+  // The hulls lie apart along the normal of a's chord.
+  bool chord_parts(const Piece& a, const Piece& b) const {
+    const Vector2d chord = a.last() - a.first();
+    const double length = chord.norm();
+    if (length == 0) return false;
+    const Vector2d normal = Vector2d(-chord.y(), chord.x()) / length;
+    double a_min = 0, a_max = 0;
+    double b_min = std::numeric_limits<double>::infinity(), b_max = -b_min;
+    for (int i = 1; i <= a.degree(); ++i) {
+      const double x = normal.dot(a.span.point(i) - a.first());
+      a_min = std::min(a_min, x);
+      a_max = std::max(a_max, x);
+    }
+    for (int i = 0; i <= b.degree(); ++i) {
+      const double x = normal.dot(b.span.point(i) - a.first());
+      b_min = std::min(b_min, x);
+      b_max = std::max(b_max, x);
+    }
+    return a_max + margin_ < b_min || b_max + margin_ < a_min;
+  }
+
+  bool near_known_contact(const Piece& a, const Piece& b) const {
+    const auto near = [this](const Piece& piece, const Vector2d& x) {
+      return (piece.box.min - x).cwiseAbs().maxCoeff() <= cluster_ && (piece.box.max - x).cwiseAbs().maxCoeff() <= cluster_;
+    };
+    return std::any_of(places_.begin(), places_.end(), [&](const Vector2d& x) { return near(a, x) || near(b, x); });
+  }
+
+  // Pieces that share no joint.
+  void apart(const Piece& a, const Piece& b) {
+    if (boxes_apart(a.box, b.box) || overlapped_) return;
+    if (a.straight() && b.straight()) {
+      segments(a, b);
+      return;
+    }
+    if (chord_parts(a, b) || chord_parts(b, a) || near_known_contact(a, b)) return;
+    if (a.size() <= smallest_ && b.size() <= smallest_) {
+      add_contact(a, b, 0.5 * (a.first() + b.first()));
+      return;
+    }
+    if (b.size() > a.size()) {
+      const auto [b1, b2] = halves(b);
+      apart(a, b1);
+      apart(a, b2);
+    } else {
+      const auto [a1, a2] = halves(a);
+      apart(a1, b);
+      apart(a2, b);
+    }
+  }
+
+  void segments(const Piece& a, const Piece& b) {
+    const int b0 = orientation(a.first(), a.last(), b.first()), b1 = orientation(a.first(), a.last(), b.last());
+    const int a0 = orientation(b.first(), b.last(), a.first()), a1 = orientation(b.first(), b.last(), a.last());
+    if (a0 * a1 > 0 || b0 * b1 > 0) return;
+    const Vector2d da = a.last() - a.first(), db = b.last() - b.first();
+    if (a0 == 0 && a1 == 0) {
+      // On one line: ordered by the direction in which it extends most.
+      const int axis = std::abs(da.x()) >= std::abs(da.y()) ? 0 : 1;
+      const auto [a_min, a_max] = std::minmax(a.first()[axis], a.last()[axis]);
+      const auto [b_min, b_max] = std::minmax(b.first()[axis], b.last()[axis]);
+      const double low = std::max(a_min, b_min), high = std::min(a_max, b_max);
+      if (low > high) return;
+      const Vector2d x = a.first()[axis] == low ? a.first() : a.last()[axis] == low ? a.last()
+                         : b.first()[axis] == low ? b.first() : b.last();
+      if (low < high) {
+        add(ContactKind::overlap, a, b, x);
+      } else {
+        add_contact(a, b, x);
+      }
+      return;
+    }
+    if (a0 * a1 < 0 && b0 * b1 < 0) {
+      add(ContactKind::crossing, a, b, a.first() + da * (cross(b.first() - a.first(), db) / cross(da, db)));
+      return;
+    }
+    add_contact(a, b, a0 == 0 ? a.first() : a1 == 0 ? a.last() : b0 == 0 ? b.first() : b.last());
+  }
+
+  // a ends where b starts.
+  void joined(const Piece& a, const Piece& b) {
+    if (overlapped_) return;
+    const Vector2d joint = a.last();
+    if (a.straight() && b.straight()) {
+      if (orientation(a.first(), joint, b.last()) == 0 && (a.first() - joint).dot(b.last() - joint) > 0)
+        add(ContactKind::overlap, a, b, joint);
+      return;
+    }
+    if (parted_at(a, b, joint)) return;
+    if (a.size() <= smallest_ || b.size() <= smallest_) return;  // a cusp
+    const auto [a1, a2] = halves(a);
+    const auto [b1, b2] = halves(b);
+    apart(a1, b);
+    apart(a2, b2);
+    joined(a2, b1);
+  }
+
+  // A line through the joint has a on one side and b on the other.
+  static bool parted_at(const Piece& a, const Piece& b, const Vector2d& joint) {
+    const Vector2d normal = (b.last() - joint).normalized() - (a.first() - joint).normalized();
+    for (int i = 0; i < a.degree(); ++i) {
+      const Vector2d x = a.span.point(i) - joint;
+      if (x != Vector2d::Zero() && !(x.dot(normal) < 0)) return false;
+    }
+    for (int i = 1; i <= b.degree(); ++i) {
+      const Vector2d x = b.span.point(i) - joint;
+      if (x != Vector2d::Zero() && !(x.dot(normal) > 0)) return false;
+    }
+    return true;
+  }
+
+  void add(ContactKind kind, const Piece& a, const Piece& b, const Vector2d& uv) {
+    places_.push_back(uv);
+    contacts_.push_back({kind, a.loop, a.span.curve, b.loop, b.span.curve, uv.cwiseQuotient(scale_)});
+    if (kind != ContactKind::touch) overlapped_ = true;
+  }
+
+  // Crossing, touch or overlap: by the order in which the four branches leave the contact.
+  void add_contact(const Piece& a, const Piece& b, const Vector2d& uv) {
+    for (const Vector2d& known : places_) {
+      if ((known - uv).cwiseAbs().maxCoeff() <= cluster_) return;
+    }
+    const TrimSpan& span_a = chain(a)[static_cast<std::size_t>(a.link)];
+    const TrimSpan& span_b = chain(b)[static_cast<std::size_t>(b.link)];
+    const double size = std::min((span_a.last() - span_a.first()).norm(), (span_b.last() - span_b.first()).norm());
+    const double radius = std::max(1e-4 * size, 1e3 * smallest_);
+    const double a_in = branch(a, uv, radius, false), a_out = branch(a, uv, radius, true);
+    const double b_in = branch(b, uv, radius, false), b_out = branch(b, uv, radius, true);
+    const auto turn = [](double from, double to) {
+      const double x = std::fmod(to - from, 2 * std::numbers::pi);
+      return x < 0 ? x + 2 * std::numbers::pi : x;
+    };
+    for (const double x : {a_in, a_out}) {
+      for (const double y : {b_in, b_out}) {
+        if (std::min(turn(x, y), turn(y, x)) < 1e-9) return add(ContactKind::overlap, a, b, uv);
+      }
+    }
+    const bool between_in = turn(a_in, b_in) < turn(a_in, a_out), between_out = turn(a_in, b_out) < turn(a_in, a_out);
+    add(between_in != between_out ? ContactKind::crossing : ContactKind::touch, a, b, uv);
+  }
+
+  const std::vector<TrimSpan>& chain(const Piece& p) const { return chains_[static_cast<std::size_t>(p.loop)]; }
+
+  // Direction [rad] from x to where the loop is `radius` away from it, after or before the piece.
+  double branch(const Piece& p, const Vector2d& x, double radius, bool after) const {
+    const std::vector<TrimSpan>& links = chain(p);
+    std::size_t link = static_cast<std::size_t>(p.link);
+    double s = 0.5 * (p.s0 + p.s1);
+    for (std::size_t step = 0; step <= links.size(); ++step) {
+      const double end = after ? 1 : 0;
+      if ((links[link].at(end) - x).norm() >= radius) {
+        double inner = s, outer = end;
+        for (int k = 0; k < 60; ++k) {
+          const double mid = 0.5 * (inner + outer);
+          ((links[link].at(mid) - x).norm() < radius ? inner : outer) = mid;
+        }
+        const Vector2d d = links[link].at(outer) - x;
+        return std::atan2(d.y(), d.x());
+      }
+      link = (link + (after ? 1 : links.size() - 1)) % links.size();
+      s = after ? 0 : 1;
+    }
+    return 0;
+  }
+
+  std::vector<std::vector<TrimSpan>> chains_;  // spans of each loop in its direction
+  std::vector<Piece> pieces_;
+  std::vector<int> next_;
+  std::vector<LoopContact> contacts_;
+  std::vector<Vector2d> places_;               // of the contacts, scaled
+  Vector2d scale_{1, 1};
+  double margin_ = 0, smallest_ = 0;
+  static constexpr double cluster_ = 1e-7;
+  bool overlapped_ = false;  // something invalid is found: nothing more to look for
+};
+
+}  // namespace
+
+std::vector<LoopContact> find_contacts(const std::vector<TrimLoop>& loops, const TrimSpans& spans) {
+  return Finder(loops, spans).run();
+}
+
+}  // namespace toile

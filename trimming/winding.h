@@ -1,0 +1,16 @@
+// Exact winding numbers of points with respect to chains of Bezier spans.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "trimming/crossings.h"
+
+namespace toile {
+
+// How often the closed chain of spans runs counter-clockwise around the point, each span taken in its own direction;
+// nothing where the point lies on the chain.
+std::optional<int> winding_number(std::span<const TrimSpan> spans, const Eigen::Vector2d& point,
+                                  PredicateCounts& counts);
+
+}  // namespace toile
