@@ -57,46 +57,6 @@ BoundaryBezier straight_piece(const Eigen::Vector2d& from, const Eigen::Vector2d
   return piece;
 }
 
-void append_pieces(const TrimmedSurface& surface, const BoundaryPiece& piece, const Eigen::Vector2d& origin,
-                   std::vector<BoundaryBezier>& out) {
-  if (piece.curve < 0 || piece.t0 == piece.t1) {
-    if (piece.from != piece.to) {
-      out.push_back(straight_piece(piece.from, piece.to, origin));
-      out.back().trim = piece.curve >= 0;
-    }
-    return;
-  }
-  const Curve2& curve = surface.loops[piece.loop].curves[piece.curve].curve;
-  const KnotVector& knots = curve.knots();
-  const double low = std::min(piece.t0, piece.t1), high = std::max(piece.t0, piece.t1);
-  const auto first = static_cast<std::ptrdiff_t>(out.size());
-  const int last_span = knots.find_span(knots.domain().max);
-  int span = knots.find_span(low);
-  for (double a = low; a < high;) {
-    const double b = span >= last_span ? high : std::min(knots[span + 1], high);
-    out.push_back(span_piece(curve, span, a, b, origin));
-    a = b;
-    while (span < last_span && knots[span + 1] <= a) ++span;
-  }
-  if (piece.t0 > piece.t1) {
-    std::reverse(out.begin() + first, out.end());
-    std::for_each(out.begin() + first, out.end(), reverse);
-  }
-  // The ends are the event's rounded coordinates, which the neighbour shares; joints between knot spans agree likewise.
-  BoundaryBezier& head = out[first];
-  head.x[0] = head.w[0] * (Real(piece.from.x()) - origin.x());
-  head.y[0] = head.w[0] * (Real(piece.from.y()) - origin.y());
-  BoundaryBezier& tail = out.back();
-  tail.x[tail.degree] = tail.w[tail.degree] * (Real(piece.to.x()) - origin.x());
-  tail.y[tail.degree] = tail.w[tail.degree] * (Real(piece.to.y()) - origin.y());
-  for (auto k = static_cast<std::size_t>(first) + 1; k < out.size(); ++k) {
-    const BoundaryBezier& before = out[k - 1];
-    const int d = before.degree;
-    out[k].x[0] = before.x[d] * out[k].w[0] / before.w[d];
-    out[k].y[0] = before.y[d] * out[k].w[0] / before.w[d];
-  }
-}
-
 // Sum over Gauss points of A_a(x) P_b(y) dy, A_a the antiderivative of P_a, added to `sums` over t in [t0, t1].
 void add_green(const BoundaryBezier& piece, Real t0, Real t1, int n, int degree_x, int degree_y, Real* sums) {
   const GaussRule& rule = gauss_rule(n);
@@ -145,6 +105,46 @@ void add_green_adaptively(const BoundaryBezier& piece, Real t0, Real t1, int n, 
 }
 
 }  // namespace
+
+void append_pieces(const TrimmedSurface& surface, const BoundaryPiece& piece, const Eigen::Vector2d& origin,
+                   std::vector<BoundaryBezier>& out) {
+  if (piece.curve < 0 || piece.t0 == piece.t1) {
+    if (piece.from != piece.to) {
+      out.push_back(straight_piece(piece.from, piece.to, origin));
+      out.back().trim = piece.curve >= 0;
+    }
+    return;
+  }
+  const Curve2& curve = surface.loops[piece.loop].curves[piece.curve].curve;
+  const KnotVector& knots = curve.knots();
+  const double low = std::min(piece.t0, piece.t1), high = std::max(piece.t0, piece.t1);
+  const auto first = static_cast<std::ptrdiff_t>(out.size());
+  const int last_span = knots.find_span(knots.domain().max);
+  int span = knots.find_span(low);
+  for (double a = low; a < high;) {
+    const double b = span >= last_span ? high : std::min(knots[span + 1], high);
+    out.push_back(span_piece(curve, span, a, b, origin));
+    a = b;
+    while (span < last_span && knots[span + 1] <= a) ++span;
+  }
+  if (piece.t0 > piece.t1) {
+    std::reverse(out.begin() + first, out.end());
+    std::for_each(out.begin() + first, out.end(), reverse);
+  }
+  // The ends are the event's rounded coordinates, which the neighbour shares; joints between knot spans agree likewise.
+  BoundaryBezier& head = out[first];
+  head.x[0] = head.w[0] * (Real(piece.from.x()) - origin.x());
+  head.y[0] = head.w[0] * (Real(piece.from.y()) - origin.y());
+  BoundaryBezier& tail = out.back();
+  tail.x[tail.degree] = tail.w[tail.degree] * (Real(piece.to.x()) - origin.x());
+  tail.y[tail.degree] = tail.w[tail.degree] * (Real(piece.to.y()) - origin.y());
+  for (auto k = static_cast<std::size_t>(first) + 1; k < out.size(); ++k) {
+    const BoundaryBezier& before = out[k - 1];
+    const int d = before.degree;
+    out[k].x[0] = before.x[d] * out[k].w[0] / before.w[d];
+    out[k].y[0] = before.y[d] * out[k].w[0] / before.w[d];
+  }
+}
 
 void build_boundary(const TrimmedSurface& surface, const KnotMesh& mesh, const CutCell& cell, CellBoundary& out) {
   out.u = {mesh.u[cell.i], mesh.u[cell.i + 1]};
