@@ -122,7 +122,8 @@ Eigen::VectorXd row_sums(const NurbsSurface& rest, const CutQuadrature& rule, do
   return mass;
 }
 
-// 0.01 of the mass of the cell in which a control point's function is centred.
+}  // namespace
+
 Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density) {
   constexpr double fraction = 0.01;
   Eigen::VectorXd floor(rest.points().cols());
@@ -138,6 +139,8 @@ Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density) {
   }
   return floor;
 }
+
+namespace {
 
 NurbsSurface start_surface(const PanelFile& file, const ScenePanel& panel, const NurbsSurface& rest) {
   const TrimmedSurface* face = by_name(file, *panel.start);

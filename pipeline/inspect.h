@@ -1,9 +1,11 @@
 // What is in a panel file: entities, loops, cells, constraint points; for reading, for programs and as a drawing.
 #pragma once
 
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "geometry/refine.h"
@@ -27,9 +29,9 @@ struct InspectedPanel {
   TrimmedSurface face;  // refined as asked, loops valid
   TrimTopology topology;
   std::vector<ConstraintPoint> points;
-  PanelMeasure measure;           // unit of the net
-  int active_control_points = 0;  // their support meets the material
-  std::vector<double> gaps;       // per loop as read, before repair; largest, parameter plane
+  PanelMeasure measure;                      // unit of the net
+  int active_control_points = 0;             // their support meets the material
+  std::vector<std::pair<int, double>> gaps;  // loop of the file, largest gap as read [parameter plane]
   std::vector<LoopRepair> repairs;
   std::vector<std::string> warnings;
 };
