@@ -1,0 +1,152 @@
+// Quadrature over traced trims: whole panels against closed forms.
+#include <cmath>
+#include <numbers>
+
+#include "hand_made.h"
+#include "trims.h"
+
+namespace toile::test {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+struct Panel {
+  TrimmedSurface surface;
+  TrimTopology topology;
+  CutQuadrature rule;
+};
+Panel panel_of(TrimmedSurface surface, const QuadratureOptions& options = {}) {
+  Panel panel{std::move(surface), {}, {}};
+  panel.topology = trace_trims(panel.surface);
+  panel.rule = quadrature(panel.surface, panel.topology, options);
+  return panel;
+}
+const QuadratureOptions quadratic = {.degree_u = 4, .degree_v = 4, .gauss_u = 3, .gauss_v = 3};
+
+void expect_in_cells(const Panel& panel) {
+  const KnotMesh& mesh = panel.topology.mesh;
+  int last = -1;
+  for (const CellRule& cell : panel.rule.cells) {
+    EXPECT_LT(last, mesh.cell(cell.i, cell.j));
+    last = mesh.cell(cell.i, cell.j);
+    for (int k = cell.first; k < cell.first + cell.count; ++k) {
+      const Vector2d& p = panel.rule.points[k];
+      EXPECT_TRUE(mesh.u[cell.i] <= p.x() && p.x() <= mesh.u[cell.i + 1]);
+      EXPECT_TRUE(mesh.v[cell.j] <= p.y() && p.y() <= mesh.v[cell.j + 1]);
+    }
+  }
+}
+
+TEST(TrimQuadrature, DiscsOnGrids) {
+  for (const int n : {1, 2, 5, 16})
+    for (const double r : {0.45, 0.31, 0.11})
+      for (const Vector2d& share : {Vector2d(0.5, 0.5), Vector2d(0.4876, 0.5123)}) {
+        const Vector2d centre = n * share;
+        const double radius = n * r;
+        const Panel panel = panel_of(trimmed(unit_cells(n), {loop_of({round_curve(centre, radius)})}), quadratic);
+        expect_lawful(panel.rule, 2, [&](double u, double v) { return (Vector2d(u, v) - centre).norm() < radius; });
+        expect_in_cells(panel);
+        expect_near_rel(panel.rule.area, pi * radius * radius, 1e-12);
+        double total = 0;
+        for (const double w : panel.rule.weights) total += w;
+        expect_near_rel(total, pi * radius * radius, 1e-12);
+        expect_near_rel(sum(panel.rule, [&](double u, double) { return power(u - centre.x(), 2); }),
+                        pi * power(radius, 4) / 4, 1e-12);
+        expect_near_rel(
+            sum(panel.rule, [&](double u, double v) { return power(u - centre.x(), 4) * power(v - centre.y(), 4); }),
+            pi * power(radius, 10) * 3 / 640, 1e-12);
+        const PanelMeasure space = measure(panel.surface, panel.topology);
+        expect_near_rel(space.area, pi * radius * radius, 1e-11);
+        expect_near_rel(space.loop_lengths[0], 2 * pi * radius, 1e-11);
+      }
+}
+
+// The disc passes the lines around it by eps: four caps of that height, of the exact area of a cap.
+TEST(TrimQuadrature, DiscsThatJustPassKnotLines) {
+  for (double eps = 1e-2; eps > 5e-11; eps /= 10) {
+    const Vector2d centre(2.5, 2.5);
+    const double r = 1.5 + eps;
+    const Panel panel = panel_of(trimmed(unit_cells(5), {loop_of({round_curve(centre, r)})}), quadratic);
+    expect_lawful(panel.rule, 2,
+                  [&](double u, double v) { return (Vector2d(u, v) - centre).norm() <= r * (1 + 1e-15); });
+    expect_in_cells(panel);
+    expect_near_rel(panel.rule.area, pi * r * r, 1e-12);
+    const double height = r - 1.5, half_angle = 2 * std::asin(std::sqrt(height / (2 * r)));
+    // r^2 (a - sin a cos a), without cancellation: a - sin(2 a) / 2 by its series where a is small.
+    double cap = 0, term = 2 * half_angle;
+    for (int k = 1; k < 12; ++k) {
+      term *= -4 * half_angle * half_angle / ((2 * k) * (2 * k + 1));
+      cap -= term / 2;
+    }
+    int caps = 0;
+    for (const CellRule& cell : panel.rule.cells)
+      if ((cell.i == 0 && cell.j == 2) || (cell.i == 2 && cell.j == 0) || (cell.i == 4 && cell.j == 2) ||
+          (cell.i == 2 && cell.j == 4)) {
+        ++caps;
+        expect_near_rel(cell.area, r * r * cap, std::max(1e-12, 2e-15 / eps));
+      }
+    EXPECT_EQ(caps, 4);
+  }
+}
+
+TEST(TrimQuadrature, PolygonsWithHolesOnGrids) {
+  const std::vector<Vector2d> outer = {{0.25, 0.125}, {5.5, 0.25}, {5.75, 4}, {3, 5.875}, {2.5, 3.25}, {0.125, 5.5}};
+  const std::vector<Vector2d> hole = {{1.25, 1.5}, {1.5, 2.75}, {3.25, 2.25}};
+  const Panel panel =
+      panel_of(trimmed(unit_cells(6), {polygon_loop(outer), polygon_loop(hole, LoopKind::hole)}), quadratic);
+  expect_in_cells(panel);
+  for (int b = 0; b <= 4; ++b)
+    for (int a = 0; a <= 4; ++a)
+      expect_near_rel(moment(panel.rule, a, b),
+                      Rational(exact_moment(outer, a, b) + exact_moment(hole, a, b)).convert_to<double>(), 1e-12);
+}
+
+TEST(TrimQuadrature, TrimsOnKnotLinesCutNothing) {
+  const std::vector<Vector2d> square = {{1, 1}, {4, 1}, {4, 3}, {1, 3}};
+  const Panel panel = panel_of(trimmed(unit_cells(5), {polygon_loop(square)}), quadratic);
+  EXPECT_EQ(panel.rule.cells.size(), 6u);
+  for (const CellRule& cell : panel.rule.cells) EXPECT_TRUE(cell.tensor);
+  EXPECT_EQ(panel.rule.area, 6);
+}
+
+// Reversed curves and holes turn nothing but the direction.
+TEST(TrimQuadrature, ReversedCurvesGiveTheSameRule) {
+  const auto area = [](bool reversed) {
+    TrimLoop loop = loop_of({round_curve({2.3, 2.6}, 1.7)});
+    if (reversed) {
+      loop.curves[0].curve = backwards(loop.curves[0].curve);
+      loop.curves[0].reversed = true;
+    }
+    return panel_of(trimmed(unit_cells(5), {loop}), quadratic);
+  };
+  const Panel plain = area(false), reversed = area(true);
+  ASSERT_EQ(plain.rule.cells.size(), reversed.rule.cells.size());
+  for (std::size_t k = 0; k < plain.rule.cells.size(); ++k)
+    expect_near_rel(reversed.rule.cells[k].area, plain.rule.cells[k].area, 1e-12);
+}
+
+// The integral of exp(u + v / 2) over a disc of radius r is 2 pi r I_1(c r) / c with c = |(1, 1/2)|: a function that no
+// degree has exactly. Products of degree 2 p leave an error of order 2 p + 1 at least.
+TEST(TrimQuadrature, SmoothFunctionsConvergeOnDiscs) {
+  const double c = std::hypot(1, 0.5), r = 0.83;
+  const double exact = 2 * pi * r * std::cyl_bessel_i(1, c * r) / c;
+  for (const int p : {1, 2}) {
+    double before = 0;
+    for (const int n : {2, 4, 8, 16}) {
+      const double h = 2.0 / n;
+      const Panel panel = panel_of(trimmed(unit_cells(n), {loop_of({round_curve({1 / h, 1 / h}, r / h)})}),
+                                   {.degree_u = 2 * p, .degree_v = 2 * p, .gauss_u = p + 1, .gauss_v = p + 1});
+      const double integral =
+          h * h * sum(panel.rule, [&](double u, double v) { return std::exp(u * h - 1 + (v * h - 1) / 2); });
+      const double error = std::abs(integral / exact - 1);
+      if (n == 16) {
+        EXPECT_LT(error, p == 1 ? 1e-6 : 1e-11);
+        EXPECT_LT(error, before * std::pow(2.0, -(2 * p + 0.5)));
+      }
+      if (n == 8) before = error;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace toile::test
