@@ -133,7 +133,7 @@ Minimum<N, Dim> descend(const Evaluate& evaluate, Eigen::Matrix<double, N, 1> q,
         const double slope = local.gradient.dot(trial - q);
         const bool descends = slope < 0 && next.f <= local.f + 1e-4 * slope;
         // Near the minimum f no longer tells points apart, while the residual still does.
-        const bool level = std::abs(next.f - local.f) <= 8 * epsilon * (local.f + grain * std::sqrt(2 * local.f)) &&
+        const bool level = std::abs(next.f - local.f) <= 8 * epsilon * local.f + grain * std::sqrt(2 * local.f) &&
                            tangential_residual<N, Dim>(next, open_directions<N>(trial, next.gradient, box)) < residual / 2;
         if (!descends && !level) continue;
         q = trial;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "geometry/error.h"
 #include "geometry/line_net.h"
@@ -90,7 +91,7 @@ NurbsSurface to_surface(LineNet net, const NurbsSurface& like, Direction d) {
 // (the last of width - Dim = 1 being the weight). Polynomial: basis functions are nonnegative and sum to 1, so no point
 // moves further than the farthest control point. Rational, with C = A / W and C' = A' / W':
 //   C - C' = sum N_i (dA_i - C' dW_i) / sum N_i w_i <= max_i |w'_i (P_i - P'_i) + (P_i - C') dW_i| / w_i,
-// and where N_i acts, C' lies in the hull of the P'_k. Infinite where a weight of the second isn't positive.
+// and where N_i acts, C' lies in the hull of the P'_k. Weights must be positive.
 template <int Dim>
 double deviation_bound(const Rows& a, const Rows& b, bool rational) {
   const int width = rational ? Dim + 1 : Dim;
@@ -108,7 +109,6 @@ double deviation_bound(const Rows& a, const Rows& b, bool rational) {
     for (Eigen::Index i = 0; i < net->rows(); ++i)
       for (Eigen::Index g = 0; g < groups; ++g) {
         const double w = (*net)(i, g * width + Dim);
-        if (!(w > 0)) return std::numeric_limits<double>::infinity();
         const Eigen::Array<double, 1, Dim> point = net->row(i).segment(g * width, Dim).array() / w;
         low = low.min(point);
         high = high.max(point);
@@ -122,6 +122,14 @@ double deviation_bound(const Rows& a, const Rows& b, bool rational) {
       bound = std::max(bound, (wb * move.norm() + diameter * std::abs(wa - wb)) / wa);
     }
   return bound;
+}
+
+// Removal may leave control points without a positive weight although the curve between them has one.
+template <int Dim>
+bool weights_positive(const Rows& rows) {
+  for (Eigen::Index k = Dim; k < rows.cols(); k += Dim + 1)
+    if (!(rows.col(k).minCoeff() > 0)) return false;
+  return true;
 }
 
 struct Removed {
@@ -143,7 +151,9 @@ Removed try_removal(const LineNet& net, double knot, bool rational) {
     again.topRows(joined + 1) = without.rows.topRows(joined + 1);
     again.bottomRows(again.rows() - joined - 1) = without.rows.bottomRows(without.rows.rows() - joined);
   }
-  return {std::move(without), deviation_bound<Dim>(net.rows, again, rational)};
+  const double bound = rational && !weights_positive<Dim>(without.rows) ? std::numeric_limits<double>::infinity()
+                                                                        : deviation_bound<Dim>(net.rows, again, rational);
+  return {std::move(without), bound};
 }
 
 void check_removable(const KnotVector& knots, double knot) {
@@ -193,7 +203,7 @@ template <int Dim>
 std::optional<NurbsCurve<Dim>> remove_knot(const NurbsCurve<Dim>& curve, double knot, double tolerance) {
   check_removable(curve.knots(), knot);
   Removed removed = try_removal<Dim>(to_net(curve), knot, curve.rational());
-  if (!(removed.bound <= tolerance)) return std::nullopt;
+  if (!std::isfinite(removed.bound) || removed.bound > tolerance) return std::nullopt;
   return to_curve(std::move(removed.net), curve);
 }
 
@@ -201,7 +211,7 @@ std::optional<NurbsSurface> remove_knot(const NurbsSurface& surface, Direction d
                                         double tolerance, double* deviation) {
   check_removable(surface.knots(direction), knot);
   Removed removed = try_removal<3>(to_net(surface, direction), knot, surface.rational());
-  if (!(removed.bound <= tolerance)) return std::nullopt;
+  if (!std::isfinite(removed.bound) || removed.bound > tolerance) return std::nullopt;
   if (deviation) *deviation = removed.bound;
   return to_surface(std::move(removed.net), surface, direction);
 }

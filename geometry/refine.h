@@ -82,10 +82,10 @@ NurbsCurve<Dim> reversed(const NurbsCurve<Dim>& curve);
 // totals per direction. The knots returned contain the surface's own distinct knots. Knots whose continuity is below C1
 // are removed where the geometry stays within `tolerance`.
 struct RefineOptions {
-  std::optional<int> degree;
-  std::optional<double> span;
-  std::optional<std::array<int, 2>> spans;
-  std::optional<std::array<int, 2>> control_points;
+  std::optional<int> degree = {};
+  std::optional<double> span = {};
+  std::optional<std::array<int, 2>> spans = {};
+  std::optional<std::array<int, 2>> control_points = {};
   double tolerance = 0;  // length, unit of the net: how far flatness and knot removal may move the surface
 };
 struct Refinement {
