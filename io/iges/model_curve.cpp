@@ -91,12 +91,11 @@ void add_crossings(const NurbsSurface& s, const Curve2& c, Interval range, std::
   constexpr int samples = 32;
   const double shortest = 1e-7 * range.length();
   double a = range.min;
+  Spans from = spans_at(s, c, a + shortest);
   for (int i = 1; i <= samples; ++i) {
     const double end = i == samples ? range.max : range.min + range.length() * i / samples;
     const double probe = std::min(end, range.max - shortest);
-    for (int crossings = 0; crossings < 16; ++crossings) {
-      const Spans from = spans_at(s, c, a + 0.5 * shortest);
-      if (from == spans_at(s, c, probe)) break;
+    for (int crossings = 0; crossings < 16 && !(spans_at(s, c, probe) == from); ++crossings) {
       double low = a, high = probe;
       while (high - low > 1e-15 * range.length()) {
         const double middle = 0.5 * (low + high);
@@ -104,6 +103,7 @@ void add_crossings(const NurbsSurface& s, const Curve2& c, Interval range, std::
         (spans_at(s, c, middle) == from ? low : high) = middle;
       }
       a = high;
+      from = spans_at(s, c, std::min(high + shortest, range.max));
       if (high - breaks.back() > shortest && range.max - high > shortest) breaks.push_back(high);
     }
     a = probe;

@@ -133,7 +133,7 @@ void FaceWriter::add(const OutputFace& output) {
     return;
   }
   const double size = (s.points().rowwise().maxCoeff() - s.points().rowwise().minCoeff()).norm();
-  const std::optional<AffinePatch> patch = affine_patch(s, 1e-12 * size);
+  const std::optional<AffinePatch> patch = affine_patch(s, 0.1 * curve_tolerance * size);
   const int surface_number = add({.type = 128, .status = dependent}, spline);
   std::vector<const TrimLoop*> loops;
   for (const TrimLoop& loop : face.loops) loops.push_back(&loop);

@@ -1,0 +1,239 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "geometry/error.h"
+#include "geometry/refine.h"
+#include "io/iges/cards.h"
+#include "io/iges/file.h"
+#include "io/iges/parameters.h"
+#include "io/iges_corpus.h"
+#include "support/near.h"
+
+namespace toile {
+namespace {
+
+using test::message_of;
+using test::read_corpus;
+
+TrimmedSurface bent(const TrimmedSurface& panel) {
+  Eigen::Matrix3Xd points = panel.surface.points();
+  const double size = (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const Eigen::Vector3d p = points.col(i) / size;
+    points.col(i) += size * Eigen::Vector3d(0.05 * std::sin(9 * p.y()), 0.04 * std::sin(7 * p.x()),
+                                            0.1 * std::sin(8 * p.x() + 3) * std::cos(6 * p.y()));
+  }
+  TrimmedSurface out = panel;
+  out.surface = panel.surface.with_points(points);
+  return out;
+}
+
+IgesHeader header_of(const PanelFile& file) {
+  IgesHeader header;
+  header.unit = file.unit;
+  return header;
+}
+
+void expect_same_trims(const TrimmedSurface& a, const TrimmedSurface& b) {
+  ASSERT_EQ(a.loops.size(), b.loops.size());
+  for (std::size_t l = 0; l < a.loops.size(); ++l) {
+    EXPECT_EQ(a.loops[l].kind, b.loops[l].kind);
+    EXPECT_EQ(a.loops[l].index, b.loops[l].index);
+    ASSERT_EQ(a.loops[l].curves.size(), b.loops[l].curves.size());
+    for (std::size_t k = 0; k < a.loops[l].curves.size(); ++k) {
+      EXPECT_EQ(a.loops[l].curves[k].index, b.loops[l].curves[k].index);
+      EXPECT_EQ(a.loops[l].curves[k].curve, b.loops[l].curves[k].curve);
+    }
+  }
+}
+
+TEST(IgesWriting, ReplayGivesTheSameBytes) {
+  for (const std::string& name : test::corpus_names())
+    EXPECT_EQ(format_iges(read_corpus(name), IgesMode::replay), test::corpus_text(name)) << name;
+}
+
+TEST(IgesWriting, BothModesRoundTripTheCorpus) {
+  for (const std::string& name : test::corpus_names()) {
+    for (IgesMode mode : {IgesMode::replay, IgesMode::rewrite}) {
+      const PanelFile file = read_corpus(name);
+      const RoundtripReport report = roundtrip(file, mode);
+      EXPECT_TRUE(report.exact()) << name << ": " << (report.differences.empty() ? "" : report.differences[0]);
+      EXPECT_EQ(report.faces, static_cast<int>(file.panels.size()));
+      EXPECT_EQ(report.entities, static_cast<int>(file.ledger.size()));
+    }
+  }
+}
+
+TEST(IgesWriting, RoundTripSeesADifference) {
+  PanelFile file = read_corpus("hole_and_composite");
+  file.panels[0] = bent(file.panels[0]);
+  const RoundtripReport report = roundtrip(file, IgesMode::rewrite);
+  EXPECT_FALSE(report.exact());
+  EXPECT_FALSE(report.points_equal);
+  EXPECT_TRUE(report.knots_equal);
+}
+
+TEST(IgesWriting, RewritingMakesRecordsAnew) {
+  const std::string text = format_iges(read_corpus("d_exponents_and_defaults"), IgesMode::rewrite);
+  EXPECT_EQ(text.find("D+00"), std::string::npos);
+  EXPECT_NE(format_iges(read_corpus("denied_outer"), IgesMode::rewrite).find("144,1,1,0,13;"), std::string::npos);
+}
+
+TEST(IgesWriting, UnknownRecordsSurviveRewriting) {
+  const std::string text = format_iges(read_corpus("unknown_entities"), IgesMode::rewrite);
+  EXPECT_NE(text.find("5Ha;b,c;"), std::string::npos);
+  EXPECT_EQ(parse_iges(text, "again.igs").entities, read_corpus("unknown_entities").entities);
+}
+
+TEST(IgesWriting, ADrapedFaceComesBackBitForBit) {
+  for (const std::string& name : test::corpus_names()) {
+    SCOPED_TRACE(name);
+    const PanelFile source = read_corpus(name);
+    if (source.metres_per_unit != 0.001) continue;
+    std::vector<OutputFace> faces;
+    for (const TrimmedSurface& panel : source.panels) faces.push_back({bent(panel), "draped " + panel.name, 2, {{0.8, 0.2, 0.1}}});
+    const PanelFile back = parse_iges(format_iges(faces, header_of(source)).text, "back.igs");
+    EXPECT_TRUE(back.warnings.empty()) << back.warnings[0];
+    ASSERT_EQ(back.panels.size(), faces.size());
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      EXPECT_EQ(back.panels[i].surface, faces[i].face.surface);
+      EXPECT_EQ(back.panels[i].name, faces[i].name);
+      EXPECT_EQ(back.panels[i].natural_bounds, faces[i].face.natural_bounds);
+      EXPECT_EQ(back.panels[i].metres_per_unit, 0.001);
+      expect_same_trims(back.panels[i], faces[i].face);
+    }
+  }
+}
+
+TEST(IgesWriting, ModelCurvesFollowTheDeformedSurface) {
+  for (const char* name : {"hole_and_composite", "rational", "polyline_loop", "unclamped"}) {
+    SCOPED_TRACE(name);
+    const PanelFile source = read_corpus(name);
+    const std::vector<OutputFace> faces{{bent(source.panels[0]), "bent", 0, {}}};
+    const IgesOutput output = format_iges(faces, header_of(source));
+    const TrimmedSurface back = parse_iges(output.text, "back.igs").panels[0];
+    const double size = 500;
+    EXPECT_LE(output.largest_curve_fit, 5e-8 * size);
+    if (back.natural_bounds) continue;
+    double largest = 0;
+    for (const TrimLoop& loop : back.loops)
+      for (const TrimCurve& c : loop.curves) {
+        ASSERT_TRUE(c.model);
+        EXPECT_EQ(c.model->domain().min, c.curve.domain().min);
+        EXPECT_EQ(c.model->domain().max, c.curve.domain().max);
+        for (int i = 0; i <= 1000; ++i) {
+          const double t = c.curve.domain().min + c.curve.domain().length() * i / 1000;
+          const Eigen::Vector2d p = c.curve(t);
+          largest = std::max(largest, ((*c.model)(t) - back.surface(p.x(), p.y())).norm());
+        }
+      }
+    EXPECT_LE(largest, 1.1 * output.largest_curve_fit + 1e-12 * size);
+    EXPECT_GE(back.resolution, output.largest_curve_fit);
+  }
+}
+
+TEST(IgesWriting, OnAFlatPanelModelCurvesAreExact) {
+  const PanelFile source = read_corpus("polyline_loop");
+  const std::vector<OutputFace> faces{{source.panels[0], "flat", 0, {}}};
+  const IgesOutput output = format_iges(faces, header_of(source));
+  EXPECT_LE(output.largest_curve_fit, 1e-13 * 100);
+  const Curve3 model = *parse_iges(output.text, "back.igs").panels[0].loops[0].curves[0].model;
+  EXPECT_EQ(model.degree(), 1);
+  EXPECT_EQ(model.knots(), source.panels[0].loops[0].curves[0].curve.knots());
+}
+
+TEST(IgesWriting, AddressesSurviveALoopTurnedRound) {
+  const PanelFile source = read_corpus("hole_and_composite");
+  TrimmedSurface turned = source.panels[0];
+  for (TrimLoop& loop : turned.loops) {
+    std::reverse(loop.curves.begin(), loop.curves.end());
+    for (TrimCurve& c : loop.curves) c.reversed = true;
+  }
+  // Traversal may start anywhere.
+  std::rotate(turned.loops[0].curves.begin(), turned.loops[0].curves.begin() + 2, turned.loops[0].curves.end());
+  const std::vector<OutputFace> faces{{turned, "turned", 0, {}}};
+  const TrimmedSurface back = parse_iges(format_iges(faces, header_of(source)).text, "back.igs").panels[0];
+  expect_same_trims(back, source.panels[0]);
+}
+
+TEST(IgesWriting, ALoneReversedCurveIsTurnedHeadToTail) {
+  const PanelFile source = read_corpus("denied_outer");
+  TrimmedSurface panel = source.panels[0];
+  TrimCurve& odd = panel.loops[0].curves[2];
+  odd.curve = reversed(odd.curve);
+  odd.reversed = true;
+  const std::vector<OutputFace> faces{{panel, "odd", 0, {}}};
+  const TrimmedSurface back = parse_iges(format_iges(faces, header_of(source)).text, "back.igs").panels[0];
+  EXPECT_LE(back.loops[0].gap, 1e-15);
+}
+
+TEST(IgesWriting, LinesAreEightyColumnsAndCountersRight) {
+  const PanelFile source = read_corpus("hole_and_composite");
+  const std::vector<OutputFace> faces{{bent(source.panels[0]), std::string(200, 'n') + ",;", 0, {{1, 0, 0}}}};
+  const std::string text = format_iges(faces, header_of(source)).text;
+  std::map<char, int> counts;
+  for (std::size_t at = 0; at < text.size(); at += 81) {
+    ASSERT_EQ(text[at + 80], '\n');
+    const char section = text[at + 72];
+    EXPECT_EQ(std::stoi(text.substr(at + 73, 7)), ++counts[section]);
+    if (section == 'D' && counts['D'] % 2 == 1) {
+      // Status: independent faces, dependents, parameter curves, definitions.
+      const int type = std::stoi(text.substr(at, 8));
+      const std::string status = text.substr(at + 64, 8);
+      if (type == 144) {
+        EXPECT_EQ(status, "00000000");
+      } else if (type == 128 || type == 142) {
+        EXPECT_EQ(status, "00010000");
+      } else if (type == 314) {
+        EXPECT_EQ(status, "00000200");
+      } else if (type == 126 || type == 102) {
+        EXPECT_TRUE(status == "00010000" || status == "00010500");
+      }
+    }
+  }
+  const auto file = iges::parse_file(text, "lines.igs");
+  EXPECT_TRUE(file->notes.list().empty());
+  EXPECT_EQ(file->global.fields.size(), 23u);  // 25 with the two delimiters
+  EXPECT_EQ(file->global.fields[20], "11");
+  EXPECT_EQ(file->global.scale, 1);
+}
+
+TEST(IgesWriting, TheDateComesFromTheHeaderOrTheEnvironment) {
+  const PanelFile source = read_corpus("natural_144");
+  const std::vector<OutputFace> faces{{source.panels[0], "flat", 0, {}}};
+  IgesHeader header = header_of(source);
+  const char* old = std::getenv("SOURCE_DATE_EPOCH");
+  const std::string kept = old ? old : "";
+  ::unsetenv("SOURCE_DATE_EPOCH");
+  EXPECT_NE(format_iges(faces, header).text.find("15H19700101.000000"), std::string::npos);
+  ::setenv("SOURCE_DATE_EPOCH", "1795334399", 1);
+  EXPECT_NE(format_iges(faces, header).text.find("15H20261122.075959"), std::string::npos);
+  old ? ::setenv("SOURCE_DATE_EPOCH", kept.c_str(), 1) : ::unsetenv("SOURCE_DATE_EPOCH");
+  header.date = "20300102.030405";
+  EXPECT_NE(format_iges(faces, header).text.find("15H20300102.030405"), std::string::npos);
+}
+
+TEST(IgesWriting, AModelScaleIsSaidAgain) {
+  const PanelFile source = read_corpus("inch_and_scale");
+  const std::vector<OutputFace> faces{{source.panels[0], "half", 0, {}}};
+  const PanelFile back = parse_iges(format_iges(faces, header_of(source)).text, "back.igs");
+  expect_near_rel(back.metres_per_unit, source.metres_per_unit, 1e-15);
+  EXPECT_EQ(back.panels[0].surface, source.panels[0].surface);
+}
+
+TEST(IgesWriting, FacesOfDifferentUnitsAreRefused) {
+  const TrimmedSurface mm = read_corpus("natural_144").panels[0], m = read_corpus("two_panels_units_m").panels[0];
+  const std::vector<OutputFace> faces{{mm, "a", 0, {}}, {m, "b", 0, {}}};
+  EXPECT_FALSE(message_of<GeometryError>([&] { format_iges(faces, IgesHeader{}); }).empty());
+}
+
+TEST(IgesWriting, SameInputGivesSameBytes) {
+  const PanelFile source = read_corpus("hole_and_composite");
+  const std::vector<OutputFace> faces{{bent(source.panels[0]), "a", 0, {{0.1, 0.2, 0.3}}}};
+  EXPECT_EQ(format_iges(faces, header_of(source)).text, format_iges(faces, header_of(source)).text);
+}
+
+}  // namespace
+}  // namespace toile

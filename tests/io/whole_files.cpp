@@ -1,0 +1,59 @@
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "geometry/error.h"
+#include "io/file.h"
+#include "io/iges.h"
+
+namespace toile {
+namespace {
+
+class WholeFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder = std::filesystem::temp_directory_path() /
+             ("toile_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
+              std::to_string(::getpid()));
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder); }
+  std::filesystem::path folder;
+};
+
+TEST_F(WholeFile, ComesBackWithEveryByte) {
+  std::string bytes;
+  for (int i = 0; i < 300000; ++i) bytes += static_cast<char>(i * 7 % 256);
+  write_file(folder / "new" / "deep" / "a.bin", bytes);
+  EXPECT_EQ(read_file(folder / "new" / "deep" / "a.bin"), bytes);
+}
+
+TEST_F(WholeFile, ReplacesItsPredecessorAndLeavesNothingBeside) {
+  write_file(folder / "a", "one");
+  write_file(folder / "a", "two");
+  EXPECT_EQ(read_file(folder / "a"), "two");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+}
+
+TEST_F(WholeFile, ReadingRefusesDirectoriesMissingAndOversizedFiles) {
+  EXPECT_THROW(read_file(folder), InputError);
+  EXPECT_THROW(read_file(folder / "missing"), InputError);
+  EXPECT_THROW(read_iges(folder), InputError);
+  EXPECT_THROW(read_iges(folder / "missing.igs"), InputError);
+  write_file(folder / "big", std::string(100, 'x'));
+  EXPECT_THROW(read_file(folder / "big", 99), InputError);
+  EXPECT_EQ(read_file(folder / "big", 100).size(), 100u);
+}
+
+TEST_F(WholeFile, AFailedWriteKeepsWhatStoodThere) {
+  write_file(folder / "a", "old");
+  EXPECT_THROW(write_file(folder / "a" / "b", "new"), OutputError);  // a parent that is a file
+  EXPECT_THROW(write_file(folder, "new"), OutputError);              // a place that is a folder
+  EXPECT_EQ(read_file(folder / "a"), "old");
+}
+
+}  // namespace
+}  // namespace toile
