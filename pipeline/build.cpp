@@ -122,26 +122,6 @@ Eigen::VectorXd row_sums(const NurbsSurface& rest, const CutQuadrature& rule, do
   return mass;
 }
 
-}  // namespace
-
-Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density) {
-  constexpr double fraction = 0.01;
-  Eigen::VectorXd floor(rest.points().cols());
-  for (int j = 0; j < rest.count_v(); ++j) {
-    for (int i = 0; i < rest.count_u(); ++i) {
-      const double u = rest.u().greville(i), v = rest.v().greville(j);
-      const int su = rest.u().find_span(u), sv = rest.v().find_span(v);
-      const SurfaceJet jet = evaluate(rest, u, v);
-      const double area =
-          jet.u.cross(jet.v).norm() * (rest.u()[su + 1] - rest.u()[su]) * (rest.v()[sv + 1] - rest.v()[sv]);
-      floor[rest.index(i, j)] = fraction * density * area;
-    }
-  }
-  return floor;
-}
-
-namespace {
-
 NurbsSurface start_surface(const PanelFile& file, const ScenePanel& panel, const NurbsSurface& rest) {
   const TrimmedSurface* face = by_name(file, *panel.start);
   if (!face) {

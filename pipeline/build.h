@@ -53,9 +53,6 @@ struct Build {
   Eigen::Matrix3Xd net(int panel, const Eigen::VectorXd& q) const;
 };
 
-// 0.01 of the mass of the cell in which a control point's function is centred [kg]. (design.md, "Small cut cells")
-Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density);
-
 // Throws InputError (files, names), GeometryError (panel, loop, place; pin or traction on a trimmed-away place).
 Build build(Scene scene);
 
