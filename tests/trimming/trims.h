@@ -189,7 +189,7 @@ inline void expect_laws(const TrimmedSurface& surface, const TrimTopology& topol
     }
   EXPECT_EQ(cut, topology.cut_cells.size());
   const double expected = loop_area(surface);
-  expect_near_rel(area, expected, 1e-11);
+  expect_near_rel(area, expected, 1e-11, 1e-15 * (mesh.u.back() - mesh.u.front()) * (mesh.v.back() - mesh.v.front()));
   for (const TrimEvent& e : topology.events) {
     if (e.line_u >= 0) {
       EXPECT_EQ(e.uv.x(), mesh.u[static_cast<std::size_t>(e.line_u)]);
