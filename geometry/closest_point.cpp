@@ -1,4 +1,4 @@
-// closest_point(): descent from the local minima of a sampling.
+// closest_point(): descent from the local minima of a sampling, then a proof by subdivision that nothing is nearer.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 
 #include "geometry/error.h"
 #include "geometry/grid_evaluation.h"
+#include "geometry/line_net.h"
 #include "geometry/measure.h"
 
 namespace toile {
@@ -236,8 +237,8 @@ std::vector<double> samples(const KnotVector& knots) {
   return result;
 }
 
-// A sampling has one local minimum for each candidate of the global one; the nearest few are followed.
-constexpr std::size_t followed = 12;
+// A sampling has a local minimum near most minima; the nearest few are followed, the proof finds what they miss.
+constexpr std::size_t followed = 4;
 
 struct Candidate {
   double f;
@@ -265,6 +266,154 @@ std::vector<Candidate> local_minima(const std::vector<double>& u, const std::vec
   std::ranges::stable_sort(found, {}, &Candidate::f);
   if (found.size() > followed) found.resize(followed);
   return found;
+}
+
+// The proof stops where it has shown that nothing is nearer by more than this, relative to the size of the geometry: far
+// enough above the square root of the rounding of squared distances.
+constexpr double proof_slack = 1e-7;
+
+// Subdivisions spent on it. A few hundred do unless the target is as near to a whole region (the centre of a sphere).
+constexpr int most_subdivisions = 4000;
+
+// The squared distance N / W^2 to the target over one parameter rectangle, as Bernstein coefficients of degree
+// (du, dv), u fastest. Since W^2 has positive coefficients, N / W^2 >= min_k N_k / (W^2)_k; `bound` is the root of that.
+struct Piece {
+  Interval u, v;
+  int du = 0, dv = 0;
+  std::vector<double> n, w;
+  double bound = 0;
+  int number = 0;  // order of making, for ties
+
+  int count_u() const { return du + 1; }
+  double corner(int i, int j) const {
+    const int k = i * du + count_u() * j * dv;
+    return n[k] / w[k];
+  }
+};
+
+void set_bound(Piece& piece) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < piece.n.size(); ++k) lowest = std::min(lowest, piece.n[k] / piece.w[k]);
+  piece.bound = std::sqrt(std::max(lowest, 0.0));
+}
+
+double binomial(int n, int k) {
+  double result = 1;
+  for (int i = 1; i <= k; ++i) result = result * (n - k + i) / i;
+  return result;
+}
+
+// The product of Bernstein polynomials with itself, coefficients in the columns of `c` (pu + 1 fastest).
+std::vector<double> bernstein_square(const Eigen::MatrixXd& c, int pu, int pv) {
+  const int nu = 2 * pu + 1;
+  std::vector<double> result(nu * (2 * pv + 1), 0.0);
+  for (int j = 0; j <= pv; ++j)
+    for (int i = 0; i <= pu; ++i)
+      for (int l = 0; l <= pv; ++l)
+        for (int k = 0; k <= pu; ++k)
+          result[i + k + nu * (j + l)] += binomial(pu, i) * binomial(pu, k) * binomial(pv, j) * binomial(pv, l) *
+                                          c.col(i + (pu + 1) * j).dot(c.col(k + (pu + 1) * l));
+  for (int j = 0; j <= 2 * pv; ++j)
+    for (int i = 0; i <= 2 * pu; ++i) result[i + nu * j] /= binomial(2 * pu, i) * binomial(2 * pv, j);
+  return result;
+}
+
+// `net` holds w (P - target) over w, `weighted` says whether any weight differs from 1.
+Piece make_piece(Interval u, Interval v, int pu, int pv, const Eigen::MatrixXd& net, bool weighted) {
+  Piece piece{u, v, 2 * pu, 2 * pv, {}, {}, 0, 0};
+  piece.n = bernstein_square(net.topRows(net.rows() - 1), pu, pv);
+  piece.w = weighted ? bernstein_square(net.bottomRows(1), pu, pv) : std::vector<double>(piece.n.size(), 1.0);
+  set_bound(piece);
+  return piece;
+}
+
+// de Casteljau's algorithm at the middle: lines of `count` coefficients `stride` apart; `low` becomes the lower half.
+void halve_line(double* high, double* low, int count, int stride) {
+  for (int k = 0; k < count; ++k) {
+    low[k * stride] = high[0];
+    for (int i = 0; i + 1 < count - k; ++i) high[i * stride] = (high[i * stride] + high[(i + 1) * stride]) / 2;
+  }
+}
+
+// Halves the piece in the direction in which its coefficients vary more: the lower half is returned.
+Piece split(Piece& high) {
+  double along_u = 0, along_v = 0;
+  const int nu = high.count_u();
+  for (int j = 0; j <= high.dv; ++j)
+    for (int i = 0; i <= high.du; ++i) {
+      const double here = high.n[i + nu * j];
+      if (i > 0) along_u = std::max(along_u, std::abs(here - high.n[i - 1 + nu * j]));
+      if (j > 0) along_v = std::max(along_v, std::abs(here - high.n[i + nu * (j - 1)]));
+    }
+  Piece low = high;
+  const bool in_u = high.dv == 0 || (high.du > 0 && along_u * high.du >= along_v * high.dv);
+  for (auto [from, to] : {std::pair(&high.n, &low.n), std::pair(&high.w, &low.w)}) {
+    if (in_u)
+      for (int j = 0; j <= high.dv; ++j) halve_line(from->data() + nu * j, to->data() + nu * j, nu, 1);
+    else
+      for (int i = 0; i < nu; ++i) halve_line(from->data() + i, to->data() + i, high.dv + 1, nu);
+  }
+  Interval& range = in_u ? high.u : high.v;
+  const double middle = range.min + range.length() / 2;
+  (in_u ? low.u : low.v).max = middle;
+  range.min = middle;
+  set_bound(high);
+  set_bound(low);
+  return low;
+}
+
+// Best-first subdivision of the pieces. `best` is the distance found so far; where a corner is nearer, improve(q)
+// descends from it and returns the new best distance. Returns a distance below which no point lies.
+template <class Improve>
+double bound_below(std::vector<Piece> open, double best, double slack, const Improve& improve) {
+  const auto later = [](const Piece& a, const Piece& b) {
+    return a.bound != b.bound ? a.bound > b.bound : a.number > b.number;
+  };
+  int number = 0;
+  for (Piece& piece : open) piece.number = number++;
+  std::ranges::make_heap(open, later);
+  for (int splits = 0; !open.empty() && open.front().bound < best - slack; ++splits) {
+    if (splits == most_subdivisions) return open.front().bound;
+    std::ranges::pop_heap(open, later);
+    Piece high = std::move(open.back());
+    open.pop_back();
+    Piece low = split(high);
+    for (Piece* piece : {&low, &high}) {
+      for (int j = 0; j < 2; ++j)
+        for (int i = 0; i < 2; ++i)
+          if (const double f = piece->corner(i, j); f < (best - slack) * (best - slack))
+            best = improve(Eigen::Vector2d(i ? piece->u.max : piece->u.min, j ? piece->v.max : piece->v.min));
+      piece->number = number++;
+      if (piece->bound < best - slack) {
+        open.push_back(std::move(*piece));
+        std::ranges::push_heap(open, later);
+      }
+    }
+  }
+  return std::max(best - slack, 0.0);
+}
+
+// Homogeneous coordinates of the control points k(a, b) of one span, relative to the target.
+template <class Geometry, class Index>
+Eigen::MatrixXd local_net(const Geometry& geometry, const auto& target, int nu, int nv, const Index& index) {
+  const Eigen::Index dim = target.size();
+  Eigen::MatrixXd net(dim + 1, nu * nv);
+  for (int b = 0; b < nv; ++b)
+    for (int a = 0; a < nu; ++a) {
+      const int k = index(a, b);
+      const double w = geometry.rational() ? geometry.weight(k) : 1.0;
+      net.col(a + nu * b).head(dim) = w * (geometry.points().col(k) - target);
+      net(dim, a + nu * b) = w;
+    }
+  return net;
+}
+
+// Distance from the target (the origin) to the box of the control points.
+double hull_distance(const Eigen::MatrixXd& net) {
+  const Eigen::Index dim = net.rows() - 1;
+  const Eigen::MatrixXd points = net.topRows(dim).array().rowwise() / net.row(dim).array();
+  const Eigen::ArrayXd low = points.rowwise().minCoeff(), high = points.rowwise().maxCoeff();
+  return low.max(0.0).max(-high).matrix().norm();
 }
 
 void check(const ClosestPointOptions& options, bool finite_target) {
@@ -322,13 +471,39 @@ ClosestPoint closest_point(const NurbsSurface& surface, const Eigen::Vector3d& t
   }
   std::optional<Minimum<2, 3>> best;
   int iterations = 0;
-  for (const Candidate& candidate : candidates) {
-    auto found = descend_pieces<2, 3>(local, candidate.q, ends, size, target, options);
+  const auto improve = [&](const Eigen::Vector2d& q) {
+    auto found = descend_pieces<2, 3>(local, q, ends, size, target, options);
     iterations += found.iterations;
     if (!best || better(found, *best, size)) best = found;
+    return std::sqrt(2 * best->local.f);
+  };
+  for (const Candidate& candidate : candidates) improve(candidate.q);
+
+  double lower_bound = 0;
+  if (!options.start) {
+    const double distance = std::sqrt(2 * best->local.f), slack = proof_slack * size;
+    const int pu = surface.u().degree(), pv = surface.v().degree();
+    std::vector<Piece> pieces;
+    for (int sv : surface.v().spans())
+      for (int su : surface.u().spans()) {
+        const Eigen::MatrixXd net = local_net(surface, target, pu + 1, pv + 1, [&](int a, int b) {
+          return surface.index(su - pu + a, sv - pv + b);
+        });
+        if (hull_distance(net) >= distance - slack) continue;
+        const Eigen::MatrixXd in_u = detail::bezier_extraction(surface.u(), su);
+        const Eigen::MatrixXd in_v = detail::bezier_extraction(surface.v(), sv);
+        Eigen::MatrixXd bezier(4, net.cols());
+        for (int d = 0; d < 4; ++d) {
+          const Eigen::MatrixXd row = net.row(d).reshaped(pu + 1, pv + 1);
+          bezier.row(d) = (in_u * row * in_v.transpose()).reshaped().transpose();
+        }
+        pieces.push_back(make_piece({surface.u()[su], surface.u()[su + 1]}, {surface.v()[sv], surface.v()[sv + 1]}, pu,
+                                    pv, bezier, surface.rational()));
+      }
+    lower_bound = bound_below(std::move(pieces), distance, slack, improve);
   }
-  return {best->q[0],      best->q[1],     best->local.x,  std::sqrt(2 * best->local.f),
-          best->residual, iterations, best->converged};
+  return {best->q[0], best->q[1], best->local.x,   std::sqrt(2 * best->local.f), best->residual,
+          iterations, best->converged, lower_bound};
 }
 
 template <int Dim>
@@ -361,12 +536,29 @@ CurveClosestPoint<Dim> closest_point(const NurbsCurve<Dim>& curve, const Eigen::
   }
   std::optional<Minimum<1, Dim>> best;
   int iterations = 0;
-  for (const Candidate& candidate : candidates) {
-    auto found = descend_pieces<1, Dim>(local, Parameter(candidate.q[0]), ends, size, target, options);
+  const auto improve = [&](const Eigen::Vector2d& q) {
+    auto found = descend_pieces<1, Dim>(local, Parameter(q[0]), ends, size, target, options);
     iterations += found.iterations;
     if (!best || better(found, *best, size)) best = found;
+    return std::sqrt(2 * best->local.f);
+  };
+  for (const Candidate& candidate : candidates) improve(candidate.q);
+
+  double lower_bound = 0;
+  if (!options.start) {
+    const double distance = std::sqrt(2 * best->local.f), slack = proof_slack * size;
+    const int p = curve.degree();
+    std::vector<Piece> pieces;
+    for (int s : curve.knots().spans()) {
+      const Eigen::MatrixXd net = local_net(curve, target, p + 1, 1, [&](int a, int) { return s - p + a; });
+      if (hull_distance(net) >= distance - slack) continue;
+      pieces.push_back(make_piece({curve.knots()[s], curve.knots()[s + 1]}, {}, p, 0,
+                                  net * detail::bezier_extraction(curve.knots(), s).transpose(), curve.rational()));
+    }
+    lower_bound = bound_below(std::move(pieces), distance, slack, improve);
   }
-  return {best->q[0], best->local.x, std::sqrt(2 * best->local.f), best->residual, iterations, best->converged};
+  return {best->q[0],      best->local.x,   std::sqrt(2 * best->local.f), best->residual, iterations,
+          best->converged, lower_bound};
 }
 
 template CurveClosestPoint<2> closest_point(const NurbsCurve<2>&, const Eigen::Matrix<double, 2, 1>&,

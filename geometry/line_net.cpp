@@ -106,6 +106,29 @@ std::vector<Rows> bezier_rows(const LineNet& net) {
   return result;
 }
 
+// Bezier coefficient i is the blossom at p - i times the start and i times the end of the span: the recursion of the
+// basis with its own parameter at every degree.
+Eigen::MatrixXd bezier_extraction(const KnotVector& knots, int span) {
+  const int p = knots.degree();
+  const double* t = knots.knots().data() + span;
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(p + 1, p + 1);
+  for (int i = 0; i <= p; ++i) {
+    auto row = matrix.row(i);
+    row[0] = 1;
+    for (int k = 1; k <= p; ++k) {
+      const double u = k <= i ? t[1] : t[0];
+      double carried = 0;
+      for (int r = 0; r < k; ++r) {
+        const double part = row[r] / (t[r + 1] - t[r + 1 - k]);
+        row[r] = carried + (t[r + 1] - u) * part;
+        carried = (u - t[r + 1 - k]) * part;
+      }
+      row[k] = carried;
+    }
+  }
+  return matrix;
+}
+
 // Each control point of the result is the blossom of the elevated polynomial of some span at consecutive knots
 // [Ramshaw 1989]. The longest span among them is taken, so that no argument lies further than q lengths away and the
 // rounding of far extrapolation stays out.

@@ -28,6 +28,10 @@ LineNet cut(LineNet net, Interval range);
 // One block of p + 1 rows per nonempty span of the domain, Bezier coefficients on that span.
 std::vector<Rows> bezier_rows(const LineNet& net);
 
+// The (p + 1) x (p + 1) matrix that takes the p + 1 control points of a nonempty span (knot index) to the Bezier
+// coefficients on it; all entries are nonnegative and each row sums to 1.
+Eigen::MatrixXd bezier_extraction(const KnotVector& knots, int span);
+
 // Degree `degree` >= p on clamped knots; every interior multiplicity grows by the difference.
 LineNet elevate_degree(const LineNet& net, int degree);
 

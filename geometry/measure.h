@@ -17,9 +17,13 @@ Eigen::AlignedBox3d bounding_box(const NurbsSurface& surface);
 // Area of the whole (untrimmed) surface over its domain.
 double surface_area(const NurbsSurface& surface, double relative_tolerance = 1e-10);
 
-// The point of the surface nearest to `target`. `residual` is the length of the tangential part of (x - target), scaled
-// to a length; `converged` says whether it fell below the tolerance (or the minimum sits on the border with the gradient
-// pointing out). A result that did not converge is still the best found, never silent.
+// The point of the surface nearest to `target`. `residual` is the length of the part of x - target that lies in those
+// tangent directions which the border leaves open; `converged` says whether it fell below the tolerance (or the rounding
+// of the coordinates). At a fold (a C0 knot) it means that neither side leads nearer. What did not converge is still the
+// best found. Without a `start` the whole surface is searched: no point of it is nearer than `lower_bound`, which comes
+// within 1e-7 of the surface's size of `distance` unless nearly all of a region is as near (then see how far it came).
+// With a `start` the nearest point is a local one and lower_bound is 0. Throws GeometryError for a target or start that
+// isn't finite.
 struct ClosestPoint {
   double u = 0, v = 0;
   Eigen::Vector3d x = Eigen::Vector3d::Zero();
@@ -27,11 +31,12 @@ struct ClosestPoint {
   double residual = 0;
   int iterations = 0;
   bool converged = false;
+  double lower_bound = 0;
 };
 struct ClosestPointOptions {
   double tolerance = 1e-12;  // relative to the size of the surface's bounding box
   int max_iterations = 60;
-  std::optional<Eigen::Vector2d> start;  // else the nearest point of a sampling of every span
+  std::optional<Eigen::Vector2d> start = {};  // descend from here only (curves use the first entry); else search
 };
 ClosestPoint closest_point(const NurbsSurface& surface, const Eigen::Vector3d& target, const ClosestPointOptions& = {});
 
@@ -43,6 +48,7 @@ struct CurveClosestPoint {
   double residual = 0;
   int iterations = 0;
   bool converged = false;
+  double lower_bound = 0;
 };
 template <int Dim>
 CurveClosestPoint<Dim> closest_point(const NurbsCurve<Dim>& curve, const Eigen::Matrix<double, Dim, 1>& target,

@@ -79,5 +79,20 @@ void single_point(benchmark::State& state) {
 }
 BENCHMARK(single_point)->ArgNames({"p", "rational"})->ArgsProduct({{2, 3, 5}, {0, 1}});
 
+// One query with the search of the whole surface (30 x 30 spans), and one that starts near the answer.
+void closest(benchmark::State& state) {
+  const NurbsSurface surface = wavy(static_cast<int>(state.range(0)), 30, false);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  ClosestPointOptions options;
+  for (auto _ : state) {
+    const double u = uniform(random), v = uniform(random);
+    const Eigen::Vector3d target = surface(u, v) + Eigen::Vector3d(0.001, 0.002, 0.03);
+    if (state.range(1)) options.start = Eigen::Vector2d(u, v);
+    benchmark::DoNotOptimize(closest_point(surface, target, options));
+  }
+}
+BENCHMARK(closest)->ArgNames({"p", "start"})->ArgsProduct({{2, 3}, {0, 1}});
+
 }  // namespace
 }  // namespace toile

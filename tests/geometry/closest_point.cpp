@@ -49,6 +49,8 @@ TEST(ClosestPoint, IsNeverFartherThanBruteForceFinds) {
           EXPECT_TRUE(found.converged) << "residual " << found.residual << " degree " << degree;
           EXPECT_LE(found.distance, sampled.distance + 1e-12);
           EXPECT_GE(found.distance, sampled.distance - sampled.slack);
+          EXPECT_LE(found.lower_bound, found.distance);
+          EXPECT_GE(found.lower_bound, found.distance - 1.01e-7 * box.diagonal().norm());
           EXPECT_LT((s(found.u, found.v) - found.x).norm(), 1e-12 * box.diagonal().norm());
           expect_near_rel((found.x - target).norm(), found.distance, 1e-12);
         }
@@ -84,6 +86,10 @@ TEST(ClosestPoint, OnASphereLiesBelowTheTarget) {
     expect_near_rel(found.distance, std::abs(radius - 1), 1e-12, 1e-12);
     EXPECT_LT((found.x - direction).norm(), 1e-11 / std::min(1.0, radius));
   }
+  const ClosestPoint centre = closest_point(octant, Eigen::Vector3d::Zero());
+  EXPECT_TRUE(centre.converged);
+  expect_near_rel(centre.distance, 1, 1e-14);
+  expect_near_rel(centre.lower_bound, 1, 1e-3);  // every point is as near: the proof stops early and says so
   // At the pole the surface is singular, and below the equator the border is nearest.
   const ClosestPoint pole = closest_point(octant, Eigen::Vector3d(0, 0, 3));
   EXPECT_TRUE(pole.converged);
@@ -196,6 +202,7 @@ TEST(CurveClosestPoint, OnACircleLiesOnTheRay) {
   const auto centre = closest_point(circle, Eigen::Vector2d(1, 2));
   EXPECT_TRUE(centre.converged);
   expect_near_rel(centre.distance, 3, 1e-14);
+  expect_near_rel(centre.lower_bound, 3, 1e-5);
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST(SurfaceRepresentation, RemovalBoundCoversTheWholeDomain) {
         const auto without = remove_knot(s, d, s.knots(d).breaks()[i], 1e9, &bound);
         if (!without) continue;  // a weight would turn negative
         const double moved = test::largest_distance(s, *without);
-        EXPECT_LE(moved, bound);
+        EXPECT_LE(moved, bound * (1 + 1e-13));  // reached where one function is 1
         EXPECT_GT(moved, 1e-6);
         EXPECT_FALSE(remove_knot(s, d, s.knots(d).breaks()[i], moved / 2));
       }
