@@ -1,0 +1,99 @@
+#include "pipeline/svg.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+namespace toile {
+
+std::string svg_number(double value) {
+  const double rounded = std::round(100 * value) / 100;
+  std::array<char, 64> text;
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), rounded == 0 ? 0.0 : rounded).ptr};
+}
+
+std::string svg_escape(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&') {
+      out += "&amp;";
+    } else if (c == '<') {
+      out += "&lt;";
+    } else if (c == '>') {
+      out += "&gt;";
+    } else if (c == '"') {
+      out += "&quot;";
+    } else if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) > 0x7e) {
+      out += '?';  // names in IGES files come in any encoding; XML takes only valid ones
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+std::string svg_path(std::span<const Eigen::Vector2d> points, bool closed) {
+  std::string out;
+  for (const Eigen::Vector2d& p : points) {
+    out += out.empty() ? 'M' : 'L';
+    out += svg_number(p.x()) + ' ' + svg_number(p.y());
+  }
+  return closed ? out + 'Z' : out;
+}
+
+namespace {
+
+std::string attributes(std::string_view style) {
+  // A style is either attributes or the name of a class.
+  if (style.find('=') != std::string_view::npos) return ' ' + std::string(style);
+  return style.empty() ? "" : " class=\"" + std::string(style) + '"';
+}
+
+}  // namespace
+
+void Svg::path(const std::string& data, std::string_view style) {
+  body_ += "<path" + attributes(style) + " d=\"" + data + "\"/>\n";
+}
+
+void Svg::circle(const Eigen::Vector2d& centre, double radius, std::string_view style) {
+  body_ += "<circle" + attributes(style) + " cx=\"" + svg_number(centre.x()) + "\" cy=\"" + svg_number(centre.y()) +
+           "\" r=\"" + svg_number(radius) + "\"/>\n";
+}
+
+void Svg::text(const Eigen::Vector2d& at, double size, std::string_view words, std::string_view style,
+               TextAnchor anchor) {
+  static constexpr std::array<const char*, 3> names{"start", "middle", "end"};
+  body_ += "<text" + attributes(style) + " x=\"" + svg_number(at.x()) + "\" y=\"" + svg_number(at.y()) +
+           "\" font-size=\"" + svg_number(size) + "\" text-anchor=\"" + names[static_cast<std::size_t>(anchor)] +
+           "\">" + svg_escape(words) + "</text>\n";
+}
+
+void Svg::line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::string_view style) {
+  const std::array<Eigen::Vector2d, 2> ends{a, b};
+  path(svg_path(ends, false), style);
+}
+
+void Svg::arrow_head(const Eigen::Vector2d& tip, const Eigen::Vector2d& direction, double length,
+                     std::string_view style) {
+  const Eigen::Vector2d d = direction.stableNormalized();
+  const Eigen::Vector2d side(-d.y(), d.x());
+  const std::array<Eigen::Vector2d, 3> corners{tip, tip - length * d + 0.42 * length * side,
+                                               tip - length * d - 0.42 * length * side};
+  path(svg_path(corners, true), style);
+}
+
+void Svg::open_group(std::string_view title) {
+  body_ += "<g><title>" + svg_escape(title) + "</title>\n";
+}
+void Svg::close_group() {
+  body_ += "</g>\n";
+}
+
+std::string Svg::finish(double width, double height, std::string_view title, std::string_view style_sheet) const {
+  const std::string size = svg_number(width) + "\" height=\"" + svg_number(height);
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + size + "\" viewBox=\"0 0 " + svg_number(width) + ' ' +
+         svg_number(height) + "\">\n<title>" + svg_escape(title) + "</title>\n<style>\n" + std::string(style_sheet) +
+         "</style>\n<rect width=\"" + size + "\" fill=\"#ffffff\"/>\n" + body_ + "</svg>\n";
+}
+
+}  // namespace toile
