@@ -1,5 +1,6 @@
 #include "pipeline/measures.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>

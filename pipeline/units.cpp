@@ -160,8 +160,9 @@ class Parser {
     }
     if (!unit) fail(fmt::format("unknown unit '{}'", name));
     int power = 1;
-    if (peek() == '^') ++position_;
-    if (is_digit(peek()) || peek() == '-') {
+    const bool caret = peek() == '^';
+    if (caret) ++position_;
+    if (caret || is_digit(peek()) || peek() == '-') {
       const char* start = text_.data() + position_;
       const auto [end, error] = std::from_chars(start, text_.data() + text_.size(), power);
       if (error != std::errc() || std::abs(power) > 9) fail("an exponent must be a small whole number");

@@ -1,10 +1,13 @@
 // Drafts every panel file of the samples with the library itself: make_panels DIR writes DIR/<sample>/<panel>.igs.
 // The tests compare what it writes with what is committed.
+#include <Eigen/LU>
+#include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
 
+#include "geometry/error.h"
 #include "geometry/refine.h"
 #include "geometry/trimmed_surface.h"
 #include "io/file.h"

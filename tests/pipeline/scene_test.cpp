@@ -1,0 +1,200 @@
+#include "pipeline/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "geometry/error.h"
+#include "support/near.h"
+
+namespace toile {
+namespace {
+
+const std::filesystem::path scene_path = std::filesystem::path(TOILE_SAMPLES) / "kidnapped_a" / "scene.toml";
+
+// A scene that is valid, line by line, so that a test can break one line.
+std::vector<std::string> valid_lines() {
+  return {
+      /* 1 */ "[[panel]]",
+      /* 2 */ "name = \"cloth\"",
+      /* 3 */ "file = \"scene.toml\"",  // any file that exists
+      /* 4 */ "grain_deg = 30",
+      /* 5 */ "fabric = \"linen\"",
+      /* 6 */ "refine = { degree = 2, span = \"20 mm\" }",
+      /* 7 */ "[fabric.linen]",
+      /* 8 */ "density = \"150 g/m2\"",
+      /* 9 */ "bending = { b0 = 1e-4, kappa0 = 30 }",
+      /* 10 */ "[strain_limit]",
+      /* 11 */ "tolerance = 0.01",
+      /* 12 */ "[[pin]]",
+      /* 13 */ "at = \"corner:0,0\"",
+      /* 14 */ "[solver]",
+      /* 15 */ "until = 0.6",
+      /* 16 */ "[output]",
+      /* 17 */ "every = \"1/30 s\"",
+  };
+}
+
+std::string text_of(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+Scene parse(const std::vector<std::string>& lines, std::vector<std::string> settings = {}) {
+  return parse_scene(text_of(lines), scene_path, settings);
+}
+
+// The message without the path, with one line (from 1) replaced: "4: unknown key ...".
+std::string refusal(std::size_t line, const std::string& replacement) {
+  std::vector<std::string> lines = valid_lines();
+  lines[line - 1] = replacement;
+  try {
+    parse(lines);
+  } catch (const InputError& error) {
+    const std::string message = error.what(), prefix = scene_path.string() + ":";
+    return message.starts_with(prefix) ? message.substr(prefix.size()) : message;
+  }
+  return "accepted";
+}
+
+void expect_message(std::size_t line, const std::string& replacement, const std::vector<std::string>& parts) {
+  const std::string message = refusal(line, replacement);
+  EXPECT_TRUE(message.starts_with(std::to_string(line) + ":")) << message;
+  for (const std::string& part : parts) EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks " << part;
+}
+
+TEST(Scene, ComesOutInSi) {
+  const Scene scene = parse(valid_lines());
+  ASSERT_EQ(scene.panels.size(), 1u);
+  const ScenePanel& panel = scene.panels[0];
+  expect_near_rel(panel.grain, std::numbers::pi / 6, 1e-15);
+  expect_near_rel(panel.fabric.density, 0.15, 1e-15);
+  expect_near_rel(panel.span.value(), 0.02, 1e-15);
+  EXPECT_EQ(panel.fabric.bending.kappa_reg, 0.03);
+  EXPECT_TRUE(scene.strain_limit.on);
+  EXPECT_EQ(scene.every, 1.0 / 30);
+  EXPECT_EQ(scene.until, 0.6);
+  EXPECT_EQ(scene.name, "kidnapped_a");
+  EXPECT_EQ(scene.pins[0].panel, "cloth");
+}
+
+TEST(Scene, ATypoNamesLineAndNearestKey) {
+  expect_message(4, "grian_deg = 30", {"unknown key 'grian_deg' in [[panel]]", "did you mean 'grain_deg'?"});
+  expect_message(8, "densty = 1", {"unknown key 'densty' in [fabric.linen]", "did you mean 'density'?"});
+  expect_message(9, "bending = { b0 = 1e-4, kapa0 = 30 }", {"unknown key 'kapa0' in bending", "'kappa0'"});
+  expect_message(14, "[solvr]", {"unknown key 'solvr' in the scene", "'solver'"});
+  expect_message(11, "mode = \"inextensibel\"", {"unknown mode", "did you mean 'inextensible'?"});
+  expect_message(5, "fabric = \"linnen\"", {"unknown fabric 'linnen'", "did you mean 'linen'?"});
+}
+
+TEST(Scene, WrongTypesAndUnitsNameLineAndKey) {
+  expect_message(4, "grain_deg = true", {"grain_deg in [[panel]]", "not true or false"});
+  expect_message(8, "density = \"150 N\"", {"density in [fabric.linen]", "expected kg/m2"});
+  expect_message(6, "refine = { degree = 2.5 }", {"degree in refine", "whole number"});
+  expect_message(2, "name = 3", {"name in [[panel]] must be a string"});
+  expect_message(9, "bending = 3", {"bending must be a table"});
+  expect_message(13, "at = \"corner:0,2\"", {"corner:U,V with U and V 0 or 1"});
+}
+
+TEST(Scene, ValuesOutOfRangeNameLineAndKey) {
+  expect_message(8, "density = -0.1", {"density", "-0.1, must be positive"});
+  expect_message(8, "density = inf", {"must be finite"});
+  expect_message(11, "tolerance = 0", {"tolerance", "must be positive"});
+  expect_message(15, "until = -1", {"until", "must be positive"});
+  expect_message(9, "bending = { b0 = 1e-4, kappa0 = 30, kappa_reg = 31 }", {"kappa_reg", "must not exceed kappa0"});
+  expect_message(6, "refine = { degree = 1 }", {"degree in refine is 1, must be 2 to 5"});
+  expect_message(6, "refine = { span = 0.1, spans = [3, 3] }", {"one of span, spans and control_points"});
+}
+
+TEST(Scene, MissingKeysAndFilesAreNamed) {
+  expect_message(3, "file = \"nowhere.igs\"", {"nowhere.igs", "does not exist"});
+  std::vector<std::string> lines = valid_lines();
+  lines[2] = "";
+  try {
+    parse(lines);
+    FAIL() << "a panel without a file was accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("[[panel]] needs file"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Scene, LaterFeaturesAreRefusedByName) {
+  expect_message(11, "mode = \"band\"", {"not supported by this version", "inextensible"});
+  expect_message(11, "solver = \"lagrange\"", {"not supported by this version", "fast"});
+  expect_message(11, "points = \"greville\"", {"not supported by this version", "knot-mesh"});
+  expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});
+  expect_message(15, "scheme = \"newmark\"", {"not supported by this version", "verlet"});
+  expect_message(15, "until = \"rest\"", {"not supported by this version"});
+  expect_message(12, "[[seam]]", {"[[seam]] is not supported by this version"});
+  expect_message(12, "[[obstacle]]", {"[[obstacle]] is not supported by this version"});
+  expect_message(12, "[[contact_pair]]", {"[[contact_pair]] is not supported by this version"});
+  expect_message(3, "pattern = \"a.json\"", {"pattern files are not supported by this version"});
+}
+
+TEST(Scene, BrokenTomlNamesItsLine) { expect_message(8, "density = = 3", {}); }
+
+TEST(Scene, SettingsOverrideAndAdd) {
+  const Scene scene =
+      parse(valid_lines(), {"panel.0.grain_deg=45", "strain_limit.mode=off", "fabric.linen.density=200 g/m2",
+                            "load.gravity=[0, 0, -1.62]", "pin.1.at=corner:1,0", "panel[0].refine={control_points=[5,6]}"});
+  expect_near_rel(scene.panels[0].grain, std::numbers::pi / 4, 1e-15);
+  EXPECT_FALSE(scene.strain_limit.on);
+  expect_near_rel(scene.panels[0].fabric.density, 0.2, 1e-15);
+  EXPECT_EQ(scene.gravity.z(), -1.62);
+  ASSERT_EQ(scene.pins.size(), 2u);
+  EXPECT_EQ(scene.pins[1].at.text, "corner:1,0");
+  EXPECT_EQ((*scene.panels[0].control_points)[1], 6);
+  EXPECT_FALSE(scene.panels[0].span);
+}
+
+TEST(Scene, ASettingWithATypoIsRefused) {
+  EXPECT_THROW(parse(valid_lines(), {"panel.0.grian_deg=45"}), InputError);
+  EXPECT_THROW(parse(valid_lines(), {"panel.7.grain_deg=45"}), InputError);
+  EXPECT_THROW(parse(valid_lines(), {"solver.until.x=45"}), InputError);
+}
+
+TEST(Scene, AMotionRisesSmoothlyAndIsRigid) {
+  PinMotion motion;
+  motion.translate = {0, 0, 1};
+  motion.rotate = {0, 0, std::numbers::pi / 2};
+  motion.start = 1;
+  motion.end = 3;
+  const Eigen::Vector3d mean(1, 0, 0), a(2, 0, 0), b(1, 1, 0);
+  EXPECT_EQ(motion(a, mean, 0.5), a);
+  EXPECT_LT((motion(a, mean, 3) - Eigen::Vector3d(1, 1, 1)).norm(), 1e-14);
+  EXPECT_EQ(motion(a, mean, 9), motion(a, mean, 3));
+  for (const double t : {1.2, 1.9, 2.5}) {
+    expect_near_rel((motion(a, mean, t) - motion(b, mean, t)).norm(), (a - b).norm(), 1e-14);
+  }
+  const double h = 1e-4;
+  for (const double t : {1.0, 3.0}) {
+    EXPECT_LT((motion(a, mean, t + h) - motion(a, mean, t - h)).norm() / h, 1e-5) << "velocity at " << t;
+  }
+}
+
+TEST(Address, FormsAreRead) {
+  EXPECT_EQ(parse_address("corner:1,0").a, 1);
+  EXPECT_EQ(parse_address("edge:v1").b, 1);
+  const Address curve = parse_address("curve:0, 2, 0.25, 0.5");
+  EXPECT_EQ(curve.b, 2);
+  EXPECT_EQ(curve.from, 0.25);
+  EXPECT_EQ(parse_address("curve:1,3").to, 1);
+  EXPECT_EQ(parse_address("uv:0.25,-3").uv.y(), -3);
+  EXPECT_EQ(parse_address("cp:4,5").b, 5);
+  EXPECT_EQ(parse_address("box:[-1,-1,-1],[1,2,3]").max.z(), 3);
+}
+
+TEST(Address, OthersAreRefused) {
+  for (const char* text : {"", "corner", "corner:0", "corner:0,2", "corner:0,0,0", "edge:w0", "edge:u2", "curve:0",
+                           "curve:0,-1", "curve:0,1,0.5", "curve:0,1,0.5,0.5", "curve:0,1,-0.1,0.5", "curve:0,1.5", "uv:1",
+                           "uv:nan,0", "cp:1", "cp:-1,0", "box:[0,0,0]", "box:[0,0,0],[1,1]", "box:[1,0,0],[0,1,1]", "corners:0,0"}) {
+    EXPECT_THROW(parse_address(text), InputError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace toile
