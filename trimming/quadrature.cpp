@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -304,28 +305,33 @@ double CutCellRule::residual() {
 }
 
 // The change of the weights that repairs the moments with the least sum of (change / weight)^2 weight: each weight is
-// multiplied by one polynomial, near 1. False where that polynomial is not clearly positive at every candidate.
+// multiplied by one polynomial, near 1. By normal equations, or where the functions are nearly dependent on the
+// material (high degrees on triangles, slanted slivers) by an orthogonal decomposition. False where some weight would
+// fall below a fifth, or the moments stay wrong.
 bool CutCellRule::correct() {
+  constexpr double exact = 1e-14;
   Eigen::Map<Eigen::VectorXd> w(w_.data(), static_cast<Eigen::Index>(w_.size()));
   w /= w.sum();
-  if (residual() < 1e-15) return true;
-  RowMajor weighted = phi_ * w.asDiagonal();
+  if (residual() < exact) return true;
+  const Eigen::VectorXd before = w;
+  const auto acceptable = [&] { return (w.array() / before.array()).minCoeff() > 0.2; };
+  const RowMajor weighted = phi_ * w.asDiagonal();
   Eigen::MatrixXd gram = weighted * phi_.transpose();
-  // Functions that vanish on the material in double precision (a thin slanted sliver) are left alone.
   gram.diagonal().array() += 1e-15 * gram.diagonal().maxCoeff();
   const Eigen::LLT<Eigen::MatrixXd> factor(gram);
-  if (factor.info() != Eigen::Success) return false;
-  Eigen::VectorXd corrected = w;
-  for (int step = 0; step < 3; ++step) {
-    const Eigen::VectorXd coefficients = factor.solve(error_);
-    corrected.noalias() += weighted.transpose() * coefficients;
-    error_ = moments_;
-    error_.noalias() -= phi_ * corrected;
-    if (error_.cwiseAbs().maxCoeff() < 1e-16) break;
+  for (int step = 0; step < 3 && factor.info() == Eigen::Success; ++step) {
+    w.noalias() += weighted.transpose() * factor.solve(error_);
+    if (residual() < exact) return acceptable();
   }
-  if (!((corrected.array() / w.array()).minCoeff() > 0.2)) return false;
-  w = corrected;
-  return true;
+  const Eigen::VectorXd root = before.cwiseSqrt();
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> orthogonal;
+  orthogonal.setThreshold(1e-14);
+  orthogonal.compute(phi_ * root.asDiagonal());
+  for (int step = 0; step < 3; ++step) {
+    w += root.cwiseProduct(orthogonal.solve(error_));
+    if (residual() < exact) break;
+  }
+  return acceptable() && residual() < 10 * exact;
 }
 
 void CutCellRule::pivot_on(int row, int column) {
@@ -426,9 +432,9 @@ void CutCellRule::polish() {
       if (better) w = polished;
     }
     // Fewer points, or nearly dependent ones: the smallest relative change that keeps every weight positive.
-    if (!better) better = correct();
+    if (!better) correct();
     const double after = residual();
-    if (!better || !(after < before)) {
+    if (!(w.minCoeff() > 0 && after < before)) {
       w = kept;
       return;
     }
@@ -450,12 +456,13 @@ CutCellRule::Result CutCellRule::build(CellBoundary& boundary, int degree_x, int
   moments_.resize(functions_);
   for (int k = 0; k < functions_; ++k) moments_[k] = static_cast<double>(exact_[k] / exact_[0]);
   prepare(boundary);
-  bool exact = false;
-  for (int refinement = 1; refinement <= 8 && !exact; refinement *= 2) {
+  for (int refinement = 1; refinement <= 8; refinement *= 2) {
     add_candidates(refinement);
     if (x_.empty()) continue;
     tabulate();
-    exact = correct();
+    if (correct()) break;
+    // Not exact: what is kept at the end is positive, and its error reported.
+    for (double& w : w_) w = std::max(w, 0.0);
   }
   if (x_.empty()) return {};
   eliminate();
