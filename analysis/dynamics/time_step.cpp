@@ -15,7 +15,8 @@ namespace {
 constexpr int max_iterations = 60;
 constexpr double enough = 0.02;  // residual over Ritz value at which the bound costs 1 % of the step
 
-// A start that no symmetry of the panel can be orthogonal to, the same on every machine. [splitmix64, Steele et al. 2014]
+// A start that no symmetry of the panel can be orthogonal to, the same on every machine. [splitmix64, Steele et al.
+// 2014]
 Eigen::VectorXd start_vector(Eigen::Index n) {
   Eigen::VectorXd v(n);
   std::uint64_t state = 1;

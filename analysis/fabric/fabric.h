@@ -14,15 +14,15 @@ struct Fabric {
     double warp = 11.7;         // N/m
     double shear = 4.68;        // N/m, on 2 E12
   } membrane;
-  struct Bending {              // eq. (9), regularised
-    double b0 = 3.3e-3;         // N m (moment per length over curvature)
-    double kappa0 = 30;         // 1/m, where the square-root branch ends; 0 makes the law linear, m = b0 kappa
-    double kappa_reg = 0.03;    // 1/m, below which the moment becomes linear; makes the slope at 0 finite
-    double twist = 0;           // N m, energy twist * kappa12^2 per area; the paper's law has none. A linear law with
-                                // twist = b0 is the isotropic plate without lateral contraction
+  struct Bending {            // eq. (9), regularised
+    double b0 = 3.3e-3;       // N m (moment per length over curvature)
+    double kappa0 = 30;       // 1/m, where the square-root branch ends; 0 makes the law linear, m = b0 kappa
+    double kappa_reg = 0.03;  // 1/m, below which the moment becomes linear; makes the slope at 0 finite
+    double twist = 0;         // N m, energy twist * kappa12^2 per area; the paper's law has none. A linear law with
+                              // twist = b0 is the isotropic plate without lateral contraction
   } bending;
-  double drag = 0.351;          // kg/(m2 s), force per area against the velocity relative to the wind
-  double friction = 0.3;        // read and kept for scenes with contact
+  double drag = 0.351;    // kg/(m2 s), force per area against the velocity relative to the wind
+  double friction = 0.3;  // read and kept for scenes with contact
   RestCurvature rest_curvature = RestCurvature::panel;
 };
 
@@ -38,8 +38,8 @@ struct BendingResponse {
 };
 BendingResponse bending_response(const Fabric::Bending& law, double kappa);
 
-// Throws Error naming the entry of the table that is negative, not finite, or (kappa_reg where there is bending, density)
-// not positive.
+// Throws Error naming the entry of the table that is negative, not finite, or (kappa_reg where there is bending,
+// density) not positive.
 void validate(const Fabric& fabric);
 
 }  // namespace toile

@@ -16,15 +16,21 @@ inline constexpr int lane_count = 2;
 using Lanes = double __attribute__((vector_size(lane_count * sizeof(double))));
 using LaneMask = decltype(Lanes{} < Lanes{});
 
-inline double sqrt(double a) { return std::sqrt(a); }
+inline double sqrt(double a) {
+  return std::sqrt(a);
+}
 inline Lanes sqrt(Lanes a) {
   Lanes root;
   for (int l = 0; l < lane_count; ++l) root[l] = std::sqrt(a[l]);
   return root;
 }
 
-inline double select(bool which, double a, double b) { return which ? a : b; }
-inline Lanes select(LaneMask which, Lanes a, Lanes b) { return which ? a : b; }
+inline double select(bool which, double a, double b) {
+  return which ? a : b;
+}
+inline Lanes select(LaneMask which, Lanes a, Lanes b) {
+  return which ? a : b;
+}
 
 template <class Real>
 inline Real broadcast(double a) {

@@ -35,11 +35,13 @@ void evaluate_material_basis(const ShellPanel& panel, int span_u, int span_v, do
   const Eigen::Vector3d E2 = std::cos(panel.grain) * across - std::sin(panel.grain) * along_u;
   Eigen::Matrix2d J;  // eq. (5)
   J << E1.dot(A1), E1.dot(A2), E2.dot(A1), E2.dot(A2);
-  const Eigen::Matrix2d d = J.inverse();  // d(xi) / dX
+  out.chain = J.inverse();
+  const Eigen::Matrix2d& d = out.chain;
 
   const auto& N = basis.value;
   const auto second = [&](int a, int b, int k) {
-    return d(0, a) * d(0, b) * N[3][k] + (d(0, a) * d(1, b) + d(1, a) * d(0, b)) * N[4][k] + d(1, a) * d(1, b) * N[5][k];
+    return d(0, a) * d(0, b) * N[3][k] + (d(0, a) * d(1, b) + d(1, a) * d(0, b)) * N[4][k] +
+           d(1, a) * d(1, b) * N[5][k];
   };
   for (int k = 0; k < basis.size(); ++k) {
     out.value[0][k] = N[0][k];

@@ -176,8 +176,7 @@ inline PointEnergy<Real> energy_hessian(const PointLaw& law, TangentKind kind, c
     }
     const Real along = dot(M, n.a3);
     const Vec3<Real> t = n.inverse_j * (M - along * n.a3);
-    const Vec3<Real> dt =
-        n.inverse_j * (dM - (dot(dM, n.a3) + dot(M, da3)) * n.a3 - along * da3 - dj * t);
+    const Vec3<Real> dt = n.inverse_j * (dM - (dot(dM, n.a3) + dot(M, da3)) * n.a3 - along * da3 - dj * t);
     const Vec3<Real> b1 = cross(dx.x2, t) + cross(x.x2, dt), b2 = cross(dt, x.x1) + cross(t, dx.x1);
     work.bending = dot(dx.x1, b1) + dot(dx.x2, b2) + dot(dx.x11, dg.x11) + dot(dx.x22, dg.x22);
     if (law.twists()) work.bending += dot(dx.x12, dg.x12);

@@ -1,6 +1,7 @@
 // Isogeometric Kirchhoff-Love cloth: energy, force and tangent of the panels of a scene. [Peng & Zheng 2022, eqs. 1-17]
 //
-// Degrees of freedom: q = positions of all control points [m], panel by panel, u fastest, xyz interleaved (3 n numbers).
+// Degrees of freedom: q = positions of all control points [m], panel by panel, u fastest, xyz interleaved (3 n
+// numbers).
 #pragma once
 
 #include <Eigen/Core>
@@ -45,10 +46,10 @@ struct MaterialPoint {
 // Strains, curvatures and stress resultants at a material point, in weft / warp / shear.
 struct ShellState {
   Eigen::Vector3d position;
-  Eigen::Vector3d strain;       // E11, E22, 2 E12
-  Eigen::Vector3d curvature;    // kappa11, kappa22, kappa12, change from rest
-  Eigen::Vector3d second_pk;    // S11, S22, S12 [N/m]
-  Eigen::Vector2d nominal;      // lambda S in weft and warp [N/m]
+  Eigen::Vector3d strain;     // E11, E22, 2 E12
+  Eigen::Vector3d curvature;  // kappa11, kappa22, kappa12, change from rest
+  Eigen::Vector3d second_pk;  // S11, S22, S12 [N/m]
+  Eigen::Vector2d nominal;    // lambda S in weft and warp [N/m]
 };
 
 //   (1) force = -dE/dq; (2) rigid motion of q leaves the energy; (3) results don't depend on the number of threads;
@@ -65,26 +66,29 @@ class ShellModel {
   int control_point_count() const;
   const std::vector<ShellPanel>& panels() const;
   int first_control_point(int panel) const;
-  const Eigen::VectorXd& rest() const;          // 3 n
-  const Eigen::VectorXd& lumped_mass() const;   // n, row sums [kg]; 0 where a control point carries no cloth
-  const Eigen::VectorXd& lumped_drag() const;   // n, row sums of eta [kg/s]
+  const Eigen::VectorXd& rest() const;         // 3 n
+  const Eigen::VectorXd& lumped_mass() const;  // n, row sums [kg]; 0 where a control point carries no cloth
+  const Eigen::VectorXd& lumped_drag() const;  // n, row sums of eta [kg/s]
 
   // Overwrites `force` with the internal force [N] at q. Allocates nothing.
   ShellEnergy internal_force(const Eigen::Ref<const Eigen::VectorXd>& q, Eigen::Ref<Eigen::VectorXd> force) const;
 
-  // Action of the tangent stiffness at q: df = K(q) dq. TangentKind::upper leaves out what compression subtracts from the
-  // membrane's geometric stiffness (what a step size bound wants), TangentKind::exact is the derivative of -force.
+  // Action of the tangent stiffness at q: df = K(q) dq. TangentKind::upper leaves out what compression subtracts from
+  // the membrane's geometric stiffness (what a step size bound wants), TangentKind::exact is the derivative of -force.
   // Allocates nothing.
   void apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
                      Eigen::Ref<Eigen::VectorXd> df, TangentKind kind = TangentKind::upper) const;
 
   // The cell with the largest share of dq . K(q) dq, and that share's parts.
-  struct Cell { int panel = 0, i = 0, j = 0; };
+  struct Cell {
+    int panel = 0, i = 0, j = 0;
+  };
   struct CellShare {
     Cell cell;
     double membrane = 0, bending = 0;  // J, for dq in m
   };
-  CellShare stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq) const;
+  CellShare stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q,
+                          const Eigen::Ref<const Eigen::VectorXd>& dq) const;
 
   std::size_t quadrature_points() const;
   std::size_t table_bytes() const;  // memory of the stored functions

@@ -38,7 +38,8 @@ TEST(BendingResponse, BranchesMeetInEnergyAndMoment) {
   for (const double reg : {0.03, 3.0, 100.0}) {
     Fabric::Bending l = law;
     l.kappa_reg = reg;
-    const BendingResponse below = bending_response(l, std::nextafter(l.kappa0, 0.0)), at = bending_response(l, l.kappa0);
+    const BendingResponse below = bending_response(l, std::nextafter(l.kappa0, 0.0)),
+                          at = bending_response(l, l.kappa0);
     expect_near_rel(below.energy, at.energy, 1e-14);
     expect_near_rel(below.moment, at.moment, 1e-14);
     EXPECT_EQ(at.slope, l.b0);

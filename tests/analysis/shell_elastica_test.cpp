@@ -85,7 +85,9 @@ Tip shell_tip(int degree, int spans, double gamma, double membrane) {
   return {tip[0] / length, -tip[2] / length};
 }
 
-double distance(const Tip& a, const Tip& b) { return std::hypot(a.along - b.along, a.drop - b.drop); }
+double distance(const Tip& a, const Tip& b) {
+  return std::hypot(a.along - b.along, a.drop - b.drop);
+}
 
 TEST(HeavyElastica, ReferenceSolvesTheRod) {
   // Small weights: the beam's tip drops by gamma / 8.
@@ -100,7 +102,8 @@ TEST(HeavyElastica, ReferenceSolvesTheRod) {
 class ShellElastica : public ::testing::TestWithParam<double> {};
 
 // The membrane is so stiff that the weight stretches it by 1e-4 of its length at most; errors stay well above what that
-// moves the tip. Coarse quadratic strips lock (the membrane resists bending into arcs), which shows as an order above 2.
+// moves the tip. Coarse quadratic strips lock (the membrane resists bending into arcs), which shows as an order
+// above 2.
 TEST_P(ShellElastica, TipConvergesWithSecondOrderToWithinOnePercent) {
   const double gamma = GetParam(), membrane = 1e4 * gamma;
   const Tip exact = heavy_elastica(gamma);

@@ -1,8 +1,7 @@
-#include "analysis/shell/shell_model.h"
-
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "analysis/shell/shell_model.h"
 #include "support/near.h"
 #include "support/panels.h"
 
@@ -24,13 +23,16 @@ struct Case {
   bool rational;
   double grain, twist;
 };
-std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
+std::ostream& operator<<(std::ostream& out, const Case& c) {
+  return out << c.name;
+}
 
 class ShellLaws : public ::testing::TestWithParam<Case> {
  protected:
   ShellModel model() const {
     const Case& c = GetParam();
-    return ShellModel({test::make_panel(test::bumpy_surface(c.degree, 3, 2, c.rational), stiff_fabric(c.twist), c.grain)});
+    return ShellModel(
+        {test::make_panel(test::bumpy_surface(c.degree, 3, 2, c.rational), stiff_fabric(c.twist), c.grain)});
   }
   // Away from rest by strains of 0.1 and curvatures on both branches of the law.
   static Eigen::VectorXd deformed(const ShellModel& model, std::uint64_t seed = 7) {
@@ -48,8 +50,7 @@ TEST_P(ShellLaws, ForceIsMinusTheGradientOfTheEnergy) {
     Eigen::VectorXd plus = q, minus = q;
     plus[k] += h;
     minus[k] -= h;
-    const double slope =
-        (m.internal_force(plus, ignored).total() - m.internal_force(minus, ignored).total()) / (2 * h);
+    const double slope = (m.internal_force(plus, ignored).total() - m.internal_force(minus, ignored).total()) / (2 * h);
     ASSERT_TRUE(test::near_rel(force[k], -slope, 1e-6, 1e-7 * force.cwiseAbs().maxCoeff())) << "dof " << k;
   }
 }
@@ -303,6 +304,31 @@ TEST(ShellModel, PanelsDontTouchEachOther) {
   second.internal_force(q.tail(fb.size()), fb);
   EXPECT_EQ(f.head(fa.size()), fa);
   EXPECT_EQ(f.tail(fb.size()), fb);
+}
+
+// Uncut polynomial cells keep 1-D tables; the same rule not declared a tensor rule keeps full ones.
+TEST(ShellModel, BothKindsOfTablesGiveTheSameForceAndTangent) {
+  Fabric membrane = stiff_fabric(), bending = stiff_fabric();
+  membrane.bending.b0 = 0;
+  bending.membrane = {0, 0, 0};
+  for (const Fabric& fabric : {membrane, bending, stiff_fabric(), stiff_fabric(0.02)})
+    for (const auto& [degree_u, degree_v] : {std::pair(2, 2), std::pair(3, 3), std::pair(2, 3), std::pair(5, 4)}) {
+      NurbsSurface surface = test::flat_surface(1, 0.8, uniform_knots(degree_u, 4),
+                                                clamped_knots(degree_v, std::vector{0.0, 0.3, 0.4, 1.0}));
+      surface = surface.with_points(
+          surface.points() + 0.02 * Random(3).vector(surface.points().size()).reshaped(3, surface.points().cols()));
+      ShellPanel tensor = test::make_panel(surface, fabric, 0.3), full = tensor;
+      for (CellRule& cell : full.quadrature.cells) cell.tensor = false;
+      const ShellModel a({tensor}), b({full});
+      EXPECT_LT(a.table_bytes(), b.table_bytes());
+      const Eigen::VectorXd q = a.rest() + 0.03 * Random(5).vector(a.rest().size()), dq = Random(6).vector(q.size());
+      Eigen::VectorXd fa(q.size()), fb(q.size());
+      expect_near_rel(a.internal_force(q, fa).total(), b.internal_force(q, fb).total(), 1e-12);
+      EXPECT_LT((fa - fb).norm(), 1e-12 * fb.norm());
+      a.apply_tangent(q, dq, fa);
+      b.apply_tangent(q, dq, fb);
+      EXPECT_LT((fa - fb).norm(), 1e-12 * fb.norm());
+    }
 }
 
 // Cutting the same cloth into cells with other numbers of points changes which cells share a lane group, nothing else.

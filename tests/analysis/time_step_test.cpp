@@ -19,7 +19,8 @@ struct Scene {
   Eigen::VectorXd node_mass, q;
 };
 
-// Control points without cloth are fixed; masses have the floor of design.md, 0.01 of a cell's, unless another is given.
+// Control points without cloth are fixed; masses have the floor of design.md, 0.01 of a cell's, unless another is
+// given.
 Scene make_scene(ShellPanel panel, const std::function<Eigen::VectorXd(const ShellModel&)>& state,
                  const std::vector<int>& pinned = {}, double mass_floor = 0.01) {
   ShellModel model({std::move(panel)});
@@ -30,7 +31,8 @@ Scene make_scene(ShellPanel panel, const std::function<Eigen::VectorXd(const She
   const Eigen::VectorXd q = state(model);
   AffineMap map(AffineMap::identity(n), fixed, [&model, q](std::size_t, double) { return Eigen::Vector3d(0, 0, 0); });
   const CutQuadrature& rule = model.panels()[0].quadrature;
-  const double floor = mass_floor * model.lumped_mass().sum() / rule.area * rule.cells[0].area / rule.cells[0].cut_fraction;
+  const double floor =
+      mass_floor * model.lumped_mass().sum() / rule.area * rule.cells[0].area / rule.cells[0].cut_fraction;
   const Eigen::VectorXd mass = map.reduce_scalar(model.lumped_mass()).cwiseMax(floor);
   return {std::move(model), std::move(map), mass, q};
 }
@@ -74,7 +76,9 @@ void expect_step_near_limit(const Scene& s) {
   EXPECT_LE(ratio, 0.95);
 }
 
-Eigen::VectorXd at_rest(const ShellModel& model) { return model.rest(); }
+Eigen::VectorXd at_rest(const ShellModel& model) {
+  return model.rest();
+}
 
 Fabric fabric(double membrane, double b0) {
   Fabric f;

@@ -51,8 +51,8 @@ inline std::vector<std::pair<double, double>> gauss_rule(int n) {
   return rule;
 }
 
-// Gauss points on every cell, or on the part of every cell that lies in the rectangle `material` of the parameter plane;
-// `points` per direction, 0: degree + 1.
+// Gauss points on every cell, or on the part of every cell that lies in the rectangle `material` of the parameter
+// plane; `points` per direction, 0: degree + 1.
 inline CutQuadrature tensor_quadrature(const NurbsSurface& surface, std::array<Interval, 2> material, int points = 0) {
   const std::vector<double> u = surface.u().breaks(), v = surface.v().breaks();
   const auto rule_u = gauss_rule(points > 0 ? points : surface.u().degree() + 1);
@@ -88,8 +88,7 @@ inline NurbsSurface flat_surface(double width, double height, KnotVector u, Knot
   Eigen::Matrix3Xd points(3, u.control_point_count() * v.control_point_count());
   for (int j = 0; j < v.control_point_count(); ++j)
     for (int i = 0; i < u.control_point_count(); ++i)
-      points.col(i + u.control_point_count() * j)
-          << width * (u.greville(i) - u.domain().min) / u.domain().length(),
+      points.col(i + u.control_point_count() * j) << width * (u.greville(i) - u.domain().min) / u.domain().length(),
           height * (v.greville(j) - v.domain().min) / v.domain().length(), 0;
   return {std::move(u), std::move(v), points};
 }
@@ -111,9 +110,8 @@ inline ShellPanel make_flat_panel(double width, double height, int degree, int s
 inline NurbsSurface cylinder_surface(double radius, double angle, double length, int spans_u, int spans_v) {
   KnotVector u = uniform_knots(2, spans_u), v = uniform_knots(2, spans_v);
   const double w = std::cos(angle / 2), half = radius * std::tan(angle / 2);
-  const Eigen::Vector3d ends[3] = {{0, 0, 1},
-                                   {w * half, 0, w},
-                                   {radius * std::sin(angle), radius * (1 - std::cos(angle)), 1}};  // w x, w z, w
+  const Eigen::Vector3d ends[3] = {
+      {0, 0, 1}, {w * half, 0, w}, {radius * std::sin(angle), radius * (1 - std::cos(angle)), 1}};  // w x, w z, w
   const auto blossom = [&](double a, double b) -> Eigen::Vector3d {
     return (1 - b) * ((1 - a) * ends[0] + a * ends[1]) + b * ((1 - a) * ends[1] + a * ends[2]);
   };
