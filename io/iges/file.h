@@ -23,7 +23,7 @@ struct Global {
   std::vector<std::string> fields;  // 3 to the last, strings without their count, numbers as written
   std::vector<bool> is_text;        // which of them were Hollerith strings
   std::string product, system, preprocessor;
-  std::string unit;                 // canonical or given name
+  std::string unit;                 // canonical name: "MM", "INCH", ...
   int unit_flag = 1;
   double scale = 1;                 // field 13: length in the model / length in the world
   double metres_per_unit = 0.0254;  // of a model length: the unit divided by the scale
@@ -56,10 +56,11 @@ class Notes {
 
  private:
   struct Note {
-    std::string kind, message;
+    std::string message;
     int count = 0;
   };
   std::vector<Note> notes_;
+  std::map<std::string, std::size_t> index_;  // by kind
 };
 
 struct File {

@@ -26,6 +26,7 @@ std::string_view trim(std::string_view s) {
 // (after blanks); else at the delimiter nearest to the claim; else the first one.
 std::size_t hollerith_end(std::string_view text, std::size_t begin, std::size_t count, Delimiters delimiters,
                           bool& wrong_count) {
+  const char either[] = {delimiters.parameter, delimiters.record, 0};
   auto is_delimiter = [&](std::size_t i) { return text[i] == delimiters.parameter || text[i] == delimiters.record; };
   if (count <= text.size() - begin) {
     std::size_t after = begin + count;
@@ -33,15 +34,17 @@ std::size_t hollerith_end(std::string_view text, std::size_t begin, std::size_t 
     if (after < text.size() && is_delimiter(after)) return begin + count;
   }
   wrong_count = true;
-  std::size_t best = text.size();
-  for (std::size_t i = begin; i < text.size(); ++i) {
-    if (!is_delimiter(i)) continue;
-    if (count > text.size() - begin) return i;
-    auto distance = [&](std::size_t at) { return at > begin + count ? at - begin - count : begin + count - at; };
-    if (best == text.size() || distance(i) < distance(best)) best = i;
-    if (i > begin + count) break;
+  if (count > text.size() - begin) {
+    const std::size_t first = text.find_first_of(either, begin);
+    return first == std::string_view::npos ? text.size() : first;
   }
-  return best;
+  // Outwards from the claim, so that the search costs no more than what it skips.
+  const std::size_t claim = begin + count;
+  for (std::size_t d = 0; claim + d < text.size() || d <= count; ++d) {
+    if (d <= count && claim - d < text.size() && is_delimiter(claim - d)) return claim - d;
+    if (claim + d < text.size() && is_delimiter(claim + d)) return claim + d;
+  }
+  return text.size();
 }
 
 }  // namespace

@@ -29,6 +29,7 @@ class Reader {
 
  private:
   const Entry& entry(int sequence, const Entry& from, const char* role) const;
+  void spend(const Entry& e);
   Eigen::Affine3d transform(const Entry& e);
   void append_curves(const Entry& e, std::vector<Piece>& out, int depth);
   std::vector<Piece> curves(int sequence, const Entry& from, const char* role);
@@ -46,7 +47,7 @@ class Reader {
   PanelFile& out_;
   Notes notes_;
   std::vector<std::string> labels_;  // of the panels, for those without a name
-  std::vector<Disposition> pending_;
+  std::size_t spent_ = 0;            // characters of records that were read, again and again where they are shared
 };
 
 const Entry& Reader::entry(int sequence, const Entry& from, const char* role) const {
@@ -55,6 +56,13 @@ const Entry& Reader::entry(int sequence, const Entry& from, const char* role) co
     throw InputError(file_.place(from) + "pointer " + std::to_string(sequence) + " to its " + role +
                      " leads nowhere, must be an odd number up to " + std::to_string(2 * file_.entries.size() - 1));
   return *found;
+}
+
+// Surfaces and curves may be shared; a small file that shares a large record ten thousand times is an attack.
+void Reader::spend(const Entry& e) {
+  const std::size_t limit = (std::size_t{64} << 20) + 16 * file_.text.size();
+  spent_ += file_.record(e).size();
+  if (spent_ > limit) throw InputError(file_.place(e) + "its record is shared too often for the size of the file");
 }
 
 void Reader::mark(const Entry& e, Disposition disposition, std::string why) {
@@ -95,6 +103,7 @@ void Reader::append_curves(const Entry& e, std::vector<Piece>& out, int depth) {
   if (depth > max_depth) throw InputError(file_.place(e) + "its composite curves form a cycle");
   const Kind* kind = find_kind(e.type);
   const std::size_t first = out.size();
+  spend(e);
   if (e.type == 102) {
     Parameters in(file_, e, &notes_);
     for (int sequence : read_composite(in)) append_curves(entry(sequence, e, "curve"), out, depth + 1);
@@ -159,6 +168,7 @@ std::vector<Curve2> pulled_back(const std::vector<Piece>& model, const AffinePat
 TrimLoop Reader::loop(const Entry& e, int surface, const NurbsSurface& s, const Eigen::Affine3d& face_transform) {
   if (e.type != 142)
     throw InputError(file_.place(e) + "as a boundary of a trimmed surface it must be entity 142");
+  spend(e);
   Parameters in(file_, e, &notes_);
   const Boundary boundary = read_boundary(in);
   if (boundary.surface != 0 && boundary.surface != surface)
@@ -239,6 +249,7 @@ TrimLoop Reader::loop(const Entry& e, int surface, const NurbsSurface& s, const 
 NurbsSurface Reader::surface(const Entry& e, bool trimmed, std::string& name) {
   if (e.type != 128)
     throw InputError(file_.place(e) + "as a face's surface it is not read yet, must be 128");
+  spend(e);
   Parameters in(file_, e, &notes_);
   const SplineSurface spline = read_spline_surface(in);
   name = name_property(in);
@@ -357,12 +368,15 @@ void Reader::find_used_surfaces(std::set<int>& used) {
 
 // 406 form 15, else the directory's label where no other panel has it, else a number.
 void Reader::finish_names() {
+  std::map<std::string, int> taken;
   for (std::size_t i = 0; i < out_.panels.size(); ++i) {
-    if (!out_.panels[i].name.empty()) continue;
-    const bool single = std::count(labels_.begin(), labels_.end(), labels_[i]) == 1 &&
-                        std::none_of(out_.panels.begin(), out_.panels.end(),
-                                     [&](const TrimmedSurface& p) { return p.name == labels_[i]; });
-    out_.panels[i].name = !labels_[i].empty() && single ? labels_[i] : "panel_" + std::to_string(i + 1);
+    const std::string& name = out_.panels[i].name;
+    ++taken[name.empty() ? labels_[i] : name];
+  }
+  for (std::size_t i = 0; i < out_.panels.size(); ++i) {
+    std::string& name = out_.panels[i].name;
+    if (!name.empty()) continue;
+    name = !labels_[i].empty() && taken[labels_[i]] == 1 ? labels_[i] : "panel_" + std::to_string(i + 1);
   }
 }
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include "geometry/error.h"
 #include "io/iges/file.h"
@@ -162,10 +163,8 @@ void read_global(File& file, std::string_view text) {
   std::optional<Unit> by_name = unit_of_name(name);
   std::optional<Unit> unit = unit_of_flag(g.unit_flag);
   if (unit) {
-    g.unit = name.empty() ? unit->name : name;
     if (by_name && by_name->flag != unit->flag)
       note("unit flag " + flag + " and unit name '" + printable(name) + "' disagree; the flag is taken");
-    if (!by_name) g.unit = unit->name;
   } else {
     unit = by_name;
     if (!unit) {
@@ -176,9 +175,9 @@ void read_global(File& file, std::string_view text) {
     } else if (g.unit_flag != 3) {
       note("unit flag '" + printable(flag) + "' is not known; the unit name '" + printable(name) + "' is taken");
     }
-    g.unit = unit->name;
     g.unit_flag = unit->flag;
   }
+  g.unit = unit->name;
   g.metres_per_unit = unit->metres / g.scale;
   if (const std::string resolution = at(19); !resolution.empty()) {
     const std::optional<double> value = parse_real(resolution);
@@ -191,40 +190,39 @@ void read_global(File& file, std::string_view text) {
 }
 
 // Parameter lines of every entry: from its pointer as long as the lines carry its number; where the pointer leads
-// elsewhere, the first line that carries its number; where lines carry no numbers, as many as the directory says.
+// elsewhere, the first line that carries its number; where lines carry no number of an entry, as many as the directory
+// says, up to the next entry's. No line belongs to two entries.
 void resolve_records(File& file) {
   const auto& lines = file.parameter_lines;
   const int total = static_cast<int>(lines.size());
+  auto owner = [&](int i) { return lines[static_cast<std::size_t>(i)].owner; };
   std::map<int, int> first_of_owner;
-  bool mapped = false;
+  for (int i = total - 1; i >= 0; --i) first_of_owner[owner(i)] = i;
+  std::set<int> anonymous_starts;
+  auto anonymous = [&](int i) { return file.find(owner(i)) == nullptr; };
+  for (const Entry& entry : file.entries)
+    if (0 < entry.first && entry.first <= total && anonymous(entry.first - 1)) anonymous_starts.insert(entry.first - 1);
   for (Entry& entry : file.entries) {
-    int first = entry.first - 1;
+    const int pointer = entry.first - 1;
     const int claimed = entry.count;
-    auto owner = [&](int i) { return lines[static_cast<std::size_t>(i)].owner; };
-    const bool in_range = 0 <= first && first < total;
-    if (!in_range || owner(first) != entry.sequence || (first > 0 && owner(first - 1) == entry.sequence)) {
-      if (!mapped) {
-        mapped = true;
-        for (int i = total - 1; i >= 0; --i) first_of_owner[owner(i)] = i;
-      }
-      const auto found = first_of_owner.find(entry.sequence);
-      if (found != first_of_owner.end()) {
-        first = found->second;
-        file.notes.add("parameter pointer", file.place(entry) + "its parameter pointer is wrong; the lines marked with its number are taken");
-      } else if (!in_range || owner(first) != 0) {
-        first = -1;
-      }
+    entry.first = entry.count = 0;
+    if (const auto own = first_of_owner.find(entry.sequence); own != first_of_owner.end()) {
+      entry.first = own->second;
+      int end = entry.first;
+      while (end < total && owner(end) == entry.sequence) ++end;
+      entry.count = end - entry.first;
+      if (entry.first != pointer)
+        file.notes.add("parameter pointer",
+                       file.place(entry) + "its parameter pointer is wrong; the lines marked with its number are taken");
+    } else if (anonymous_starts.erase(pointer) != 0) {
+      const auto next = anonymous_starts.upper_bound(pointer);
+      const int limit = next == anonymous_starts.end() ? total : *next;
+      entry.first = pointer;
+      int end = pointer;
+      while (end < limit && anonymous(end) && end - pointer < std::max(1, claimed)) ++end;
+      entry.count = end - pointer;
     }
-    if (first < 0) {
-      entry.first = entry.count = 0;
-      continue;
-    }
-    int end = first;
-    while (end < total && owner(end) == entry.sequence) ++end;
-    if (end == first) end = static_cast<int>(std::min<long long>(total, first + std::max(1LL, static_cast<long long>(claimed))));
-    entry.first = first;
-    entry.count = end - first;
-    if (entry.count != claimed)
+    if (entry.count > 0 && entry.count != claimed)
       file.notes.add("line count", file.place(entry) + "claims " + std::to_string(claimed) + " parameter lines, has " +
                                        std::to_string(entry.count));
   }
@@ -233,12 +231,9 @@ void resolve_records(File& file) {
 }  // namespace
 
 void Notes::add(const std::string& kind, std::string message) {
-  for (Note& note : notes_)
-    if (note.kind == kind) {
-      ++note.count;
-      return;
-    }
-  notes_.push_back({kind, std::move(message), 1});
+  const auto [found, added] = index_.try_emplace(kind, notes_.size());
+  if (added) notes_.push_back({std::move(message), 0});
+  ++notes_[found->second].count;
 }
 
 std::vector<std::string> Notes::list() const {
