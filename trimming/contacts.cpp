@@ -277,7 +277,7 @@ class Finder {
       return;
     }
     if (parted_at(a, b, joint)) return;
-    if (a.size() <= smallest_ || b.size() <= smallest_) return;  // a cusp
+    if (a.size() <= cluster_ && b.size() <= cluster_) return;  // a cusp
     const auto [a1, a2] = halves(a);
     const auto [b1, b2] = halves(b);
     apart(a1, b);
@@ -337,9 +337,15 @@ class Finder {
     std::size_t link = static_cast<std::size_t>(p.link);
     double s = 0.5 * (p.s0 + p.s1);
     for (std::size_t step = 0; step <= links.size(); ++step) {
+      // Steps that double find the first way out, also where the span comes back to x.
       const double end = after ? 1 : 0;
-      if ((links[link].at(end) - x).norm() >= radius) {
-        double inner = s, outer = end;
+      double inner = s, outer = s;
+      for (double stride = 1e-12; outer != end; stride *= 2) {
+        inner = outer;
+        outer = after ? std::min(1.0, s + stride) : std::max(0.0, s - stride);
+        if ((links[link].at(outer) - x).norm() >= radius) break;
+      }
+      if ((links[link].at(outer) - x).norm() >= radius) {
         for (int k = 0; k < 60; ++k) {
           const double mid = 0.5 * (inner + outer);
           ((links[link].at(mid) - x).norm() < radius ? inner : outer) = mid;

@@ -1,0 +1,90 @@
+// The list that `toile inspect` prints.
+#include "trims.h"
+
+namespace toile::test {
+namespace {
+
+std::vector<ConstraintPoint> points_of(TrimmedSurface& face) {
+  validate_loops(face);
+  return constraint_points(face, trace_trims(face));
+}
+
+TEST(ConstraintPoints, AFaceWithoutATrimHasAllItsVertices) {
+  TrimmedSurface face = trimmed(unit_cells(8), {});
+  face.loops = {natural_loop(face.surface)};
+  face.natural_bounds = true;
+  const auto points = points_of(face);
+  EXPECT_EQ(points.size(), 81u);
+  for (const ConstraintPoint& p : points) EXPECT_EQ(p.kind, PointKind::vertex);
+}
+
+TEST(ConstraintPoints, AnExplicitBorderTrimHasCrossings) {
+  TrimmedSurface face = trimmed(unit_cells(8), {polygon_loop({{0, 0}, {8, 0}, {8, 8}, {0, 8}})});
+  const auto points = points_of(face);
+  EXPECT_EQ(points.size(), 81u);
+  EXPECT_EQ(std::count_if(points.begin(), points.end(), [](const ConstraintPoint& p) { return p.kind == PointKind::vertex; }), 49);
+  EXPECT_EQ(std::count_if(points.begin(), points.end(), [](const ConstraintPoint& p) { return p.kind == PointKind::crossing_uv && p.loop == 0; }), 32);
+  // Corner k is where curve k starts.
+  EXPECT_EQ(points[49].curve, 0);
+  EXPECT_EQ(points[49].t, face.loops[0].curves[0].curve.domain().min);
+}
+
+TEST(ConstraintPoints, NoneTwice) {
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop({{0, 0}, {4, 0}, {4, 4}, {0, 4}}),
+                                                backwards(loop_of({round_curve({1.5, 1.5}, 0.5, 0.5)})),
+                                                backwards(loop_of({round_curve({2.5, 1.5}, 0.5, 0.5)}))});
+  const auto points = points_of(face);
+  std::set<std::pair<double, double>> seen;
+  for (const ConstraintPoint& p : points) EXPECT_TRUE(seen.insert({p.u, p.v}).second) << p.u << ", " << p.v;
+  EXPECT_EQ(points.size(), 9u + 16u + 7u);
+}
+
+// Loop, curve and t name the same place on the file's curves whichever way the loop is given.
+TEST(ConstraintPoints, NumbersSurviveReversal) {
+  const std::vector<std::vector<TrimLoop>> outlines = {
+      {polygon_loop({{0.5, 0.5}, {3, 0.5}, {3, 3.5}, {1.5, 3}})},
+      {loop_of({round_curve({2, 2}, 1.5)})},
+      {loop_of({bezier_curve({{1, 2}, {2, 0.5}, {3, 2}}), bezier_curve({{3, 2}, {2, 3.5}, {1, 2}})})}};
+  for (const auto& outline : outlines) {
+    TrimmedSurface forwards = trimmed(unit_cells(4), outline);
+    const auto expected = points_of(forwards);
+    // The file runs the loop clockwise: same curves, each backwards, numbered in that order.
+    TrimmedSurface given = trimmed(unit_cells(4), outline);
+    TrimLoop& loop = given.loops[0];
+    std::reverse(loop.curves.begin(), loop.curves.end());
+    const int n = static_cast<int>(loop.curves.size());
+    for (int k = 0; k < n; ++k) {
+      loop.curves[static_cast<std::size_t>(k)].reversed = true;
+      loop.curves[static_cast<std::size_t>(k)].index = k;
+    }
+    const auto points = points_of(given);
+    EXPECT_TRUE(loop.curves.size() == 1 || loop.curves.front().index > loop.curves.back().index);
+    ASSERT_EQ(points.size(), expected.size());
+    for (const ConstraintPoint& p : points) {
+      const auto same = std::find_if(expected.begin(), expected.end(), [&](const ConstraintPoint& q) { return q.u == p.u && q.v == p.v; });
+      ASSERT_NE(same, expected.end());
+      EXPECT_EQ(p.kind, same->kind);
+      if (p.loop < 0) continue;
+      const Curve2& curve = std::find_if(loop.curves.begin(), loop.curves.end(), [&](const TrimCurve& c) { return c.index == p.curve; })->curve;
+      EXPECT_LE((curve(p.t) - Vector2d(p.u, p.v)).norm(), 1e-14);
+      // A joint is listed on the later curve in the file's order, or at a single curve's start.
+      if (p.t == curve.domain().min || p.t == curve.domain().max) {
+        const Vector2d start = n == 1 ? curve.start() : curve.end();  // the file traverses several curves backwards
+        EXPECT_EQ(start, Vector2d(p.u, p.v));
+      }
+    }
+  }
+}
+
+TEST(ConstraintPoints, OrderIsVerticesThenTheLoop) {
+  TrimmedSurface face = trimmed(unit_cells(4), {loop_of({round_curve({2, 2}, 1.5)})});
+  const auto points = points_of(face);
+  ASSERT_EQ(points.size(), 9u + 12u);
+  for (std::size_t k = 1; k < 9; ++k) EXPECT_LT(points[k - 1].v * 10 + points[k - 1].u, points[k].v * 10 + points[k].u);
+  for (std::size_t k = 10; k < points.size(); ++k) EXPECT_LT(points[k - 1].t, points[k].t);
+  // A trim corner or joint off every knot line is none.
+  for (const ConstraintPoint& p : points) EXPECT_TRUE(p.u == std::floor(p.u) || p.v == std::floor(p.v));
+}
+
+}  // namespace
+}  // namespace toile::test

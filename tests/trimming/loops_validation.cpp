@@ -1,0 +1,181 @@
+// What validation repairs, reports and refuses.
+#include "geometry/error.h"
+#include "trims.h"
+
+namespace toile::test {
+namespace {
+
+const std::vector<Vector2d> square = {{0.5, 0.5}, {3.5, 0.5}, {3.5, 3.5}, {0.5, 3.5}};
+
+TrimmedSurface with_outline(TrimLoop loop) { return trimmed(unit_cells(4), {std::move(loop)}); }
+
+void expect_error(TrimmedSurface surface, const std::vector<std::string>& parts) {
+  try {
+    validate_loops(surface);
+    FAIL() << "accepted, expected: " << parts.front();
+  } catch (const GeometryError& e) {
+    for (const std::string& part : parts) EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
+  }
+}
+
+bool reports(const std::vector<LoopRepair>& repairs, const std::string& what) {
+  return std::any_of(repairs.begin(), repairs.end(), [&](const LoopRepair& r) { return r.what.find(what) != std::string::npos; });
+}
+
+TEST(LoopValidation, LeavesGoodLoopsAlone) {
+  for (const TrimLoop& loop : {polygon_loop(square), loop_of({round_curve({2, 2}, 1.5)}), loop_of({round_curve({2, 2}, 2)})}) {
+    TrimmedSurface face = with_outline(loop);
+    EXPECT_TRUE(validate_loops(face).empty());
+    EXPECT_EQ(face.loops[0].gap, 0);
+    for (std::size_t c = 0; c < loop.curves.size(); ++c) EXPECT_EQ(face.loops[0].curves[c].curve, loop.curves[c].curve);
+  }
+}
+
+TEST(LoopValidation, OrientsByArea) {
+  TrimmedSurface face = with_outline(backwards(polygon_loop(square)));
+  face.loops.push_back(loop_of({round_curve({2, 2}, 0.5)}, LoopKind::hole));
+  face.loops[1].index = 1;
+  const auto repairs = validate_loops(face);
+  ASSERT_EQ(repairs.size(), 2u);
+  EXPECT_EQ(repairs[0].what, "reversed");
+  EXPECT_EQ(repairs[1].loop, 1);
+  expect_near_rel(loop_area(face), 9 - M_PI / 4, 1e-13);
+  EXPECT_TRUE(validate_loops(face).empty());
+}
+
+TEST(LoopValidation, TurnsCurvesThatChainOnlyTheOtherWay) {
+  TrimLoop loop = polygon_loop(square);
+  loop.curves[1].curve = backwards(loop.curves[1].curve);
+  loop.curves[0].curve = backwards(loop.curves[0].curve);
+  TrimmedSurface face = with_outline(loop);
+  const auto repairs = validate_loops(face);
+  EXPECT_EQ(repairs.size(), 2u);
+  EXPECT_TRUE(reports(repairs, "turned curve 1"));
+  EXPECT_TRUE(face.loops[0].curves[1].reversed);
+  expect_laws(face, trace_trims(face));
+}
+
+TEST(LoopValidation, ClosesSmallGapsAndSaysSo) {
+  TrimLoop loop = polygon_loop(square);
+  loop.curves[2].curve = line_segment<2>({3.5 + 3e-4, 3.5 - 4e-4}, {0.5, 3.5});
+  TrimmedSurface face = with_outline(loop);
+  const auto repairs = validate_loops(face);
+  ASSERT_EQ(repairs.size(), 1u);
+  EXPECT_TRUE(reports(repairs, "closed a gap of 0.0005"));
+  expect_near_rel(face.loops[0].gap, 5e-4, 1e-9);
+  EXPECT_LE(repairs[0].move, 5e-4);
+  // The side before runs along u = 3.5, the side after does not run along v: the joint keeps u of the first.
+  EXPECT_EQ(face.loops[0].curves[1].curve.end(), face.loops[0].curves[2].curve.start());
+  EXPECT_EQ(face.loops[0].curves[1].curve.end().x(), 3.5);
+  expect_laws(face, trace_trims(face));
+}
+
+TEST(LoopValidation, RefusesOpenLoops) {
+  TrimLoop loop = polygon_loop(square);
+  loop.curves[2].curve = line_segment<2>({3.4, 3.5}, {0.5, 3.5});
+  expect_error(with_outline(loop), {"panel 'panel', loop 0, curve 1: ", "open", "(u, v) = (3.5, 3.5)"});
+  TrimLoop single = loop_of({bezier_curve({{1, 1}, {3, 1}, {2, 3}})});
+  expect_error(with_outline(single), {"loop 0, curve 0", "open"});
+}
+
+TEST(LoopValidation, RefusesAFigureEight) {
+  expect_error(with_outline(polygon_loop({{1, 1}, {3, 3}, {3, 1}, {1, 3}})), {"panel 'panel', loop 0, curve", "crosses curve", "(u, v) = (2, 2)"});
+  // Curved.
+  expect_error(with_outline(loop_of({bezier_curve({{1, 1}, {2.5, 2}, {3, 3}}), bezier_curve({{3, 3}, {3.5, 2}, {3, 1}}), bezier_curve({{3, 1}, {2, 1.5}, {1, 3}}), line_segment<2>({1, 3}, {1, 1})})),
+               {"loop 0, curve", "crosses curve"});
+  // A loop within one span.
+  expect_error(with_outline(loop_of({bezier_curve({{1, 1}, {6, 4}, {-2, 4}, {3, 1}}), line_segment<2>({3, 1}, {1, 1})})), {"loop 0, curve 0: crosses"});
+}
+
+TEST(LoopValidation, ACuspIsNoCrossing) {
+  TrimmedSurface face = with_outline(loop_of({bezier_curve({{1, 1}, {4, 3}, {4, 1}, {1, 3}}), line_segment<2>({1, 3}, {1, 1})}));
+  EXPECT_TRUE(validate_loops(face).empty());
+  expect_laws(face, trace_trims(face));
+}
+
+TEST(LoopValidation, RefusesRetracedLoops) {
+  expect_error(with_outline(polygon_loop({{1, 1}, {3, 1}, {3, 2}, {2, 2}, {3, 2}, {3, 3}, {1, 3}})), {"runs along"});
+}
+
+TEST(LoopValidation, RefusesHolesOutside) {
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop({{1, 1}, {2, 1}, {2, 2}, {1, 2}}), backwards(loop_of({round_curve({3, 3}, 0.5)}))});
+  expect_error(face, {"panel 'panel', loop 1", "outside the outer loop"});
+}
+
+TEST(LoopValidation, RefusesHolesThatCrossTheOutline) {
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3.5, 2}, 0.5)}))});
+  expect_error(face, {"panel 'panel', loop", "crosses", "(u, v) = (3.5, "});
+}
+
+TEST(LoopValidation, RefusesHolesInHoles) {
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({2, 2}, 1)})),
+                                                backwards(loop_of({round_curve({2, 2}, 0.5)}))});
+  expect_error(face, {"loop 2", "inside loop 1"});
+}
+
+TEST(LoopValidation, ReportsTouchesAndKeepsThem) {
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3, 2}, 0.5)}))});
+  const auto repairs = validate_loops(face);
+  ASSERT_EQ(repairs.size(), 1u);
+  EXPECT_TRUE(reports(repairs, "touches"));
+  expect_laws(face, trace_trims(face));
+}
+
+TEST(LoopValidation, NearMissesAreNoContacts) {
+  for (const double gap : {1e-3, 1e-8, 1e-12}) {
+    TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3 - gap, 2}, 0.5)}))});
+    EXPECT_TRUE(validate_loops(face).empty()) << gap;
+  }
+  // Two arcs of nearly one curvature, 1e-10 apart all along.
+  TrimmedSurface lune = with_outline(loop_of({bezier_curve({{1, 1}, {2, 0.5}, {3, 1}}), line_segment<2>({3, 1}, {3, 1 + 1e-10}),
+                                              bezier_curve({{3, 1 + 1e-10}, {2, 0.5 + 1e-10}, {1, 1 + 1e-10}}), line_segment<2>({1, 1 + 1e-10}, {1, 1})}));
+  EXPECT_TRUE(validate_loops(lune).empty());
+  expect_laws(lune, trace_trims(lune));
+}
+
+TEST(LoopValidation, MovesSmallExcursionsIntoTheDomain) {
+  TrimmedSurface face = with_outline(polygon_loop({{-1e-3, 0}, {4, 0}, {4, 4}, {-1e-3, 4}}));
+  const auto repairs = validate_loops(face);
+  EXPECT_TRUE(reports(repairs, "into the domain"));
+  expect_laws(face, trace_trims(face));
+  expect_near_rel(loop_area(face), 16, 1e-14);
+  expect_error(with_outline(polygon_loop({{-0.1, 0}, {4, 0}, {4, 4}, {0, 4}})), {"loop 0, curve", "leaves the domain by 0.1", "(-0.1, 0)"});
+  // Control points outside don't matter where the curve stays within.
+  TrimmedSurface hull = with_outline(loop_of({bezier_curve({{1, 1}, {2, -0.5}, {3, 1}}), line_segment<2>({3, 1}, {2, 3}), line_segment<2>({2, 3}, {1, 1})}));
+  EXPECT_TRUE(validate_loops(hull).empty());
+}
+
+TEST(LoopValidation, SnapsToKnotLinesWithinTheResolution) {
+  TrimmedSurface face = with_outline(polygon_loop({{1 + 1e-9, 1}, {3, 1 - 1e-9}, {3, 3}, {1, 3}}));
+  face.resolution = 1e-8;
+  const auto repairs = validate_loops(face);
+  EXPECT_TRUE(reports(repairs, "snapped curve 0 to u = 1"));
+  const Tally t = tally(trace_trims(face));
+  EXPECT_EQ(t.cut, 0);
+  EXPECT_EQ(t.inside, 4);
+  EXPECT_EQ(t.crossing_uv, 8);
+  // Not further than that.
+  TrimmedSurface sliver = with_outline(polygon_loop({{1 + 1e-7, 1}, {3, 1}, {3, 3}, {1 + 1e-7, 3}}));
+  sliver.resolution = 1e-8;
+  EXPECT_TRUE(validate_loops(sliver).empty());
+}
+
+TEST(LoopValidation, NeedsOneOuterLoop) {
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square)});
+  face.loops[0].kind = LoopKind::hole;
+  expect_error(face, {"0 outer loops"});
+}
+
+TEST(LoopValidation, UnclampedCurvesGetTheirEnds) {
+  // A closed uniform quadratic B-spline: its ends meet though no control point lies on it.
+  std::vector<Vector2d> ring;
+  for (int k = 0; k < 8; ++k) ring.emplace_back(2 + 1.5 * std::cos(k % 6 * M_PI / 3), 2 + 1.5 * std::sin(k % 6 * M_PI / 3));
+  Curve2::Points points(2, 8);
+  for (int k = 0; k < 8; ++k) points.col(k) = ring[static_cast<std::size_t>(k)];
+  TrimmedSurface face = with_outline(loop_of({Curve2(KnotVector(2, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}), points)}));
+  validate_loops(face);
+  expect_laws(face, trace_trims(face));
+}
+
+}  // namespace
+}  // namespace toile::test
