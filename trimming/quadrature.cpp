@@ -306,32 +306,47 @@ double CutCellRule::residual() {
 
 // The change of the weights that repairs the moments with the least sum of (change / weight)^2 weight: each weight is
 // multiplied by one polynomial, near 1. By normal equations, or where the functions are nearly dependent on the
-// material (high degrees on triangles, slanted slivers) by an orthogonal decomposition. False where some weight would
-// fall below a fifth, or the moments stay wrong.
+// material (high degrees on triangles, slanted slivers) by an orthogonal decomposition. Weights stay above a fifth of
+// what they were. False where the moments stay wrong.
 bool CutCellRule::correct() {
-  constexpr double exact = 1e-14;
+  // Moments are no better known than the sum over the boundary that they come from.
+  const double noise = static_cast<double>(1e-18L / exact_[0]);
+  const double exact = std::max(1e-14, noise);
   Eigen::Map<Eigen::VectorXd> w(w_.data(), static_cast<Eigen::Index>(w_.size()));
   w /= w.sum();
-  if (residual() < exact) return true;
+  double least = residual();
+  if (least < exact) return true;
   const Eigen::VectorXd before = w;
-  const auto acceptable = [&] { return (w.array() / before.array()).minCoeff() > 0.2; };
+  Eigen::VectorXd best = w;
+  const auto improved = [&] {
+    const double now = residual();
+    if (!((w.array() / before.array()).minCoeff() > 0.2 && now < least)) return false;
+    best = w;
+    least = now;
+    return true;
+  };
   const RowMajor weighted = phi_ * w.asDiagonal();
   Eigen::MatrixXd gram = weighted * phi_.transpose();
   gram.diagonal().array() += 1e-15 * gram.diagonal().maxCoeff();
   const Eigen::LLT<Eigen::MatrixXd> factor(gram);
-  for (int step = 0; step < 3 && factor.info() == Eigen::Success; ++step) {
+  for (int step = 0; step < 3 && least > exact && factor.info() == Eigen::Success; ++step) {
     w.noalias() += weighted.transpose() * factor.solve(error_);
-    if (residual() < exact) return acceptable();
+    if (!improved()) break;
   }
-  const Eigen::VectorXd root = before.cwiseSqrt();
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> orthogonal;
-  orthogonal.setThreshold(1e-14);
-  orthogonal.compute(phi_ * root.asDiagonal());
-  for (int step = 0; step < 3; ++step) {
-    w += root.cwiseProduct(orthogonal.solve(error_));
-    if (residual() < exact) break;
+  if (least > exact) {
+    w = best;
+    residual();
+    const Eigen::VectorXd root = before.cwiseSqrt();
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> orthogonal;
+    orthogonal.setThreshold(std::max(1e-14, 100 * noise));
+    orthogonal.compute(phi_ * root.asDiagonal());
+    for (int step = 0; step < 3 && least > exact; ++step) {
+      w += root.cwiseProduct(orthogonal.solve(error_));
+      if (!improved()) break;
+    }
   }
-  return acceptable() && residual() < 10 * exact;
+  w = best;
+  return least < 10 * exact;
 }
 
 void CutCellRule::pivot_on(int row, int column) {
@@ -456,13 +471,13 @@ CutCellRule::Result CutCellRule::build(CellBoundary& boundary, int degree_x, int
   moments_.resize(functions_);
   for (int k = 0; k < functions_; ++k) moments_[k] = static_cast<double>(exact_[k] / exact_[0]);
   prepare(boundary);
-  for (int refinement = 1; refinement <= 8; refinement *= 2) {
+  // Where the last try isn't exact either, its weights are positive and their error is reported.
+  bool exact = false;
+  for (int refinement = 1; refinement <= 8 && !exact; refinement *= 2) {
     add_candidates(refinement);
     if (x_.empty()) continue;
     tabulate();
-    if (correct()) break;
-    // Not exact: what is kept at the end is positive, and its error reported.
-    for (double& w : w_) w = std::max(w, 0.0);
+    exact = correct();
   }
   if (x_.empty()) return {};
   eliminate();
