@@ -1,0 +1,270 @@
+#include "pipeline/run.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "geometry/error.h"
+#include "pipeline/measures.h"
+#include "pipeline/output.h"
+#include "pipeline/panels.h"
+#include "pipeline/places.h"
+#include "support/near.h"
+
+namespace toile {
+namespace {
+
+using test::Folder;
+
+Build built(const Folder& folder, const TrimmedSurface& face, const std::string& scene) {
+  test::write_panels(folder / "panel.igs", {face});
+  return build(parse_scene(scene, folder / "scene.toml"));
+}
+
+const std::string corner_pins = "[[pin]]\nat = \"corner:0,0\"\n[[pin]]\nat = \"corner:1,0\"\n";
+
+std::string geometry_refusal(const TrimmedSurface& face, const std::string& pins) {
+  const Folder folder("refusal");
+  const Build b = built(folder, face, test::scene_text(pins));
+  try {
+    assemble(b, 0);
+  } catch (const GeometryError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Places, TrimmedAwayPlacesAreNamed) {
+  const TrimmedSurface face = test::trimmed_sheet("cloth");
+  for (const char* at : {"corner:0,0", "edge:u0", "edge:v1", "uv:10,10", "uv:900,10", "curve:0,7", "curve:1,0", "cp:40,0"}) {
+    const std::string message = geometry_refusal(face, std::string("[[pin]]\nat = \"") + at + "\"\n");
+    EXPECT_NE(message.find(std::string("pin 0 (") + at + ")"), std::string::npos) << at << ": " << message;
+    EXPECT_NE(message.find("'cloth'"), std::string::npos) << at << ": " << message;
+    EXPECT_NE(message.find("scene.toml:4"), std::string::npos) << at << ": " << message;
+  }
+}
+
+TEST(Places, ACurveThatCoversAnEdgeHoldsItsControlPoints) {
+  const Folder folder("edge");
+  const Build b = built(folder, test::sheet("cloth"), test::scene_text("[[pin]]\nat = \"curve:0,2\"\n"));
+  const auto curve = assemble(b, 0);
+  const Folder other("edge2");
+  const Build e = built(other, test::sheet("cloth"), test::scene_text("[[pin]]\nat = \"edge:v1\"\n"));
+  const auto edge = assemble(e, 0);
+  EXPECT_EQ(curve->map->fixed(), edge->map->fixed());
+  EXPECT_EQ(curve->place_rows, 0);
+}
+
+TEST(Places, FractionsOfACurveAreOfItsLengthInSpace) {
+  const Folder folder("length");
+  const Build b = built(folder, test::trimmed_sheet("cloth"), test::scene_text(""));
+  const BuiltPanel& panel = b.panels[0];
+  const CurveOnSurface path(panel.face, panel.topology, 0, 2, b.rest(0));
+  // The panel is flat and isometric: lengths are those of the plane curve in millimetres.
+  const Curve2& curve = panel.face.loops[0].curves[2].curve;
+  expect_near_rel(path.length(), 1e-3 * arc_length(curve, curve.domain()), 1e-10);
+  for (const double fraction : {0.1, 0.5, 0.83}) {
+    const double t = path.parameter(fraction);
+    expect_near_rel(arc_length(curve, {curve.domain().min, t}), fraction * 1e3 * path.length(), 1e-10);
+  }
+}
+
+TEST(Places, ALineLoadAddsUpToItsLength) {
+  const Folder folder("traction");
+  const Build b = built(folder, test::trimmed_sheet("cloth"),
+                        test::scene_text("[[traction]]\nalong = \"curve:0,0,0.25,1\"\nforce = [0, -2, 0]\n",
+                                         "[load]\ngravity = [0, 0, 0]\n"));
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int i = 0; i < b.model->control_point_count(); ++i) sum += b.loads.force.segment<3>(3 * i);
+  expect_near_rel(sum.y(), -2 * 0.75 * 0.34, 1e-12);
+  EXPECT_EQ(sum.x(), 0);
+}
+
+TEST(Places, CurvePinRowsAreIndependent) {
+  const Folder folder("rank");
+  const Build b = built(folder, test::trimmed_sheet("cloth"), test::scene_text("[[pin]]\nat = \"curve:0,2\"\n"));
+  const auto system = assemble(b, 0);
+  const auto& rows = system->projection->rows().place;
+  ASSERT_GE(rows.size(), 4u);
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows.size()), system->map->nodes());
+  const Eigen::MatrixXd free = system->map->free_part();
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (std::size_t k = 0; k < rows[r].row.index.size(); ++k) {
+      dense.row(static_cast<Eigen::Index>(r)) += rows[r].row.value[k] * free.row(rows[r].row.index[k]);
+    }
+    dense.row(static_cast<Eigen::Index>(r)).array() /= system->dynamic.node_mass.transpose().array().sqrt();
+    dense.row(static_cast<Eigen::Index>(r)).normalize();
+  }
+  const Eigen::VectorXd singular = dense.bdcSvd().singularValues();
+  EXPECT_GT(singular.minCoeff(), 1e-4 * singular.maxCoeff());
+}
+
+TEST(Run, StepsLandOnFrames) {
+  const Folder folder("frames");
+  const Build b = built(folder, test::sheet("cloth"),
+                        test::scene_text(corner_pins, "") + "[load]\nwind = [0, 0, 1]\n");
+  std::vector<double> times;
+  RunHooks hooks;
+  hooks.frame = [&](const RunFrame& frame) { times.push_back(frame.time); };
+  const RunResult result = run(b, hooks);
+  EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
+  EXPECT_EQ(times, (std::vector<double>{0, 0.05, 0.1}));
+  EXPECT_EQ(result.time, 0.1);
+  EXPECT_EQ(result.energy.injected, 0) << "an undriven run gains no energy";
+}
+
+TEST(Run, TheSameSceneGivesTheSameBytes) {
+  const Folder folder("bytes");
+  const Build b = built(folder, test::trimmed_sheet("cloth"), test::scene_text("[[pin]]\nat = \"curve:0,2\"\n"));
+  const RunResult first = run(b), second = run(b);
+  const Eigen::VectorXd q = control_points(*first.system, first.state);
+  EXPECT_GT((q - b.start).norm(), 1e-3);
+  EXPECT_EQ(q, control_points(*second.system, second.state));
+  EXPECT_EQ(draped_file(b, q).text, draped_file(b, control_points(*second.system, second.state)).text);
+}
+
+TEST(Run, DrapedFileIsTheLastState) {
+  const Folder folder("draped");
+  const Build b = built(folder, test::trimmed_sheet("cloth"),
+                        test::scene_text("[[pin]]\nat = \"curve:0,2\"\n") );
+  const RunResult result = run(b);
+  const Eigen::VectorXd q = control_points(*result.system, result.state);
+  const PanelFile file = parse_iges(draped_file(b, q).text, "draped.igs");
+  ASSERT_EQ(file.panels.size(), 2u);
+  const TrimmedSurface& flat = file.panels[0];
+  const TrimmedSurface& draped = file.panels[1];
+  EXPECT_EQ(flat.name, "cloth flat");
+  EXPECT_EQ(draped.name, "cloth draped");
+  EXPECT_EQ(file.metres_per_unit, 1e-3);
+  ASSERT_EQ(draped.loops.size(), 1u);
+  ASSERT_EQ(draped.loops[0].curves.size(), 4u);
+  for (std::size_t c = 0; c < 4; ++c) {
+    EXPECT_EQ(draped.loops[0].curves[c].curve.points(), b.panels[0].source.loops[0].curves[c].curve.points());
+  }
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> in(0, 400);
+  int inside = 0;
+  double worst = 0, worst_flat = 0;
+  while (inside < 1000) {
+    const Eigen::Vector2d uv(in(random), in(random));
+    if (!contains(b.panels[0].face, b.panels[0].topology, uv)) continue;
+    ++inside;
+    const Eigen::Vector3d x = file.metres_per_unit * draped.surface(uv.x(), uv.y());
+    worst = std::max(worst, (x - b.model->state(0, uv.x(), uv.y(), q).position).norm());
+    const Eigen::Vector3d f = file.metres_per_unit * flat.surface(uv.x(), uv.y());
+    worst_flat = std::max(worst_flat, (f - 1e-3 * Eigen::Vector3d(uv.x(), uv.y(), 0)).norm());
+  }
+  EXPECT_LT(worst, 1e-12);
+  EXPECT_LT(worst_flat, 1e-12);
+
+  // It can start a new drape from where it ended.
+  const Folder next("restart");
+  write_file(next / "panel.igs", draped_file(b, q).text);
+  std::string text = test::scene_text("[[pin]]\nat = \"curve:0,2\"\n");
+  text.replace(text.find("name = \"cloth\""), 14, "name = \"cloth flat\"\nstart = \"cloth draped\"");
+  const Build again = build(parse_scene(text, next / "scene.toml"));
+  EXPECT_LT((again.start - q).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_EQ(run(again).exit, RunExit::ok);
+}
+
+TEST(Run, ReactionsCarryTheWeightAtRest) {
+  const Folder folder("weight");
+  // Hung by its top edge in its own plane, soon at rest: no swing, strong drag.
+  std::string text = test::scene_text("[[pin]]\nat = \"edge:v1\"\n", "[load]\ngravity = [0, -9.81, 0]\n");
+  text += "[fabric.heavy]\ndrag = 20\ndensity = 0.2\n";
+  text.replace(text.find("file ="), 6, "fabric = \"heavy\"\nfile =");
+  text.replace(text.find("until = 0.1"), 11, "until = 3.0");
+  const Build b = built(folder, test::sheet("cloth"), text);
+  const RunResult result = run(b);
+  EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
+  const StateMeasures m = measure(b, *result.system, result.state, result.dt_last);
+  expect_near_rel(m.mass, 0.2 * 0.16, 1e-12);
+  expect_near_rel(m.reactions[0].y(), m.mass * 9.81, 1e-3);
+  EXPECT_LT(std::abs(m.reactions[0].z()), 1e-6);
+}
+
+TEST(Run, APinMovesWhatItHoldsAndLetsItGo) {
+  const Folder folder("motion");
+  const std::string pins =
+      "[[pin]]\nat = \"edge:v1\"\nmove = { translate = [0, 0, 0.02], end = 0.05 }\n"
+      "[[pin]]\nat = \"uv:200,40\"\nrelease = 0.05\n";
+  const Build b = built(folder, test::sheet("cloth"), test::scene_text(pins));
+  std::vector<Eigen::Vector3d> held, edge;
+  RunHooks hooks;
+  hooks.frame = [&](const RunFrame& frame) {
+    held.push_back(b.model->state(0, 200, 40, frame.q).position);
+    edge.push_back(b.model->state(0, 130, 400, frame.q).position);
+  };
+  const RunResult result = run(b, hooks);
+  ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+  ASSERT_EQ(held.size(), 3u);
+  EXPECT_LT((edge[1] - edge[0] - Eigen::Vector3d(0, 0, 0.02)).norm(), 1e-12);
+  EXPECT_LT((edge[2] - edge[1]).norm(), 1e-12);
+  EXPECT_LT((held[1] - held[0]).norm(), 1e-8) << "held until the release";
+  EXPECT_GT((held[2] - held[1]).norm(), 1e-4) << "falls after it";
+  EXPECT_EQ(result.system->place_rows, 0);
+}
+
+TEST(Run, AHopelessStepEndsWithTheReason) {
+  const Folder folder("hopeless");
+  std::string text = test::scene_text(corner_pins);
+  text.replace(text.find("tolerance = 0.01"), 16, "mode = \"off\"");
+  text.replace(text.find("until = 0.1"), 11, "until = 400.0\ndt = 40.0");
+  text.replace(text.find("every = 0.05"), 12, "every = 400.0");
+  const Build b = built(folder, test::sheet("cloth"), text);
+  const RunResult result = run(b);
+  EXPECT_EQ(result.exit, RunExit::solver_failed);
+  EXPECT_TRUE(control_points(*result.system, result.state).allFinite());
+  for (const char* part : {"panel 'cloth'", "cell (", "smaller dt"}) {
+    EXPECT_NE(result.reason.find(part), std::string::npos) << result.reason;
+  }
+}
+
+TEST(Run, AStepAboveTheBoundIsHalvedAndTheRunGoesOn) {
+  const Folder folder("halved");
+  std::string text = test::scene_text(corner_pins);
+  text.replace(text.find("tolerance = 0.01"), 16, "mode = \"off\"");
+  const Build automatic = built(folder, test::sheet("cloth"), text);
+  const RunResult fine = run(automatic);
+  text.replace(text.find("until = 0.1"), 11, "until = 0.1\ndt = " + std::to_string(4 * fine.dt_max));
+  const Build b = built(folder, test::sheet("cloth"), text);
+  const RunResult result = run(b);
+  EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
+  EXPECT_GT(result.redone_steps, 0);
+  EXPECT_LT(result.dt_min, 2 * fine.dt_max);
+}
+
+TEST(Run, StoppingLeavesAWholeResult) {
+  const Folder folder("stop");
+  const Build b = built(folder, test::sheet("cloth"), test::scene_text(corner_pins));
+  int steps = 0;
+  RunHooks hooks;
+  hooks.stop = [&] { return ++steps == 3; };
+  const RunResult result = run(b, hooks);
+  EXPECT_EQ(result.exit, RunExit::interrupted);
+  EXPECT_EQ(result.steps, 3);
+  EXPECT_GT(result.time, 0);
+}
+
+TEST(Build, AKinkIsNamedByItsKnot) {
+  TrimmedSurface face = test::sheet("cloth");
+  const NurbsSurface& flat = face.surface;
+  const NurbsSurface doubled = insert_knots(flat, Direction::u, std::vector<double>{160});
+  Eigen::Matrix3Xd net = doubled.points();
+  for (auto point : net.colwise()) point.z() = std::abs(point.x() - 160);
+  face.surface = doubled.with_points(net);
+  const Folder folder("kink");
+  try {
+    built(folder, face, test::scene_text(corner_pins));
+    FAIL() << "a kinked panel was accepted";
+  } catch (const GeometryError& error) {
+    EXPECT_NE(std::string(error.what()).find("u = 160"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace toile
