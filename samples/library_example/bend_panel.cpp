@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "geometry/error.h"
 #include "io/file.h"
 #include "io/iges.h"
 #include "trimming/constraint_points.h"
