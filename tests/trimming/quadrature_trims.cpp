@@ -1,6 +1,7 @@
 // Quadrature over traced trims: whole panels against closed forms.
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "hand_made.h"
 #include "trims.h"
@@ -145,6 +146,36 @@ TEST(TrimQuadrature, SmoothFunctionsConvergeOnDiscs) {
       }
       if (n == 8) before = error;
     }
+  }
+}
+
+// Star-shaped closed splines of degree 1 to 4 with corners at random radii and weights: the rule is exact to
+// rounding, and its points lie in the material.
+TEST(TrimQuadrature, RandomSplinesObeyTheLaws) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const auto uniform = [&](double a, double b) { return a + (b - a) * static_cast<double>(random()) / 4294967296.0; };
+    const int n = 1 + static_cast<int>(random() % 6), degree = 1 + static_cast<int>(random() % 4),
+              corners = degree + 3 + static_cast<int>(random() % 5);
+    const Vector2d centre(n * uniform(0.4, 0.6), n * uniform(0.4, 0.6));
+    Curve2::Points points(2, corners + 1);
+    std::vector<double> knots(degree + 1, 0.0), weights;
+    for (int k = 0; k < corners; ++k) {
+      const double angle = 2 * pi * k / corners, r = 0.38 * n * uniform(0.3, 1);
+      points.col(k) = centre + r * Vector2d(std::cos(angle), std::sin(angle));
+    }
+    points.col(corners) = points.col(0);
+    for (int k = 0; k <= corners; ++k) weights.push_back(seed % 2 ? uniform(0.5, 2) : 1);
+    for (int k = 1; k < corners + 1 - degree; ++k) knots.push_back(k);
+    for (int k = 0; k <= degree; ++k) knots.push_back(corners + 1 - degree);
+    const int p = 1 + static_cast<int>(seed % 4);
+    const Panel panel =
+        panel_of(trimmed(unit_cells(n), {loop_of({Curve2(KnotVector(degree, knots), points, weights)})}),
+                 {.degree_u = 2 * p, .degree_v = 2 * p, .gauss_u = p + 1, .gauss_v = p + 1});
+    expect_lawful(panel.rule, p, [&](double u, double v) { return contains(panel.surface, panel.topology, {u, v}); });
+    expect_in_cells(panel);
+    expect_near_rel(panel.rule.area, loop_area(panel.surface), 1e-11);
   }
 }
 
