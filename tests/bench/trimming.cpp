@@ -1,5 +1,5 @@
-// Constraint points of a 200 x 200-span face with a trim of 500 spans: validation, tracing and listing, one core. Making the
-// face is excluded.
+// Constraint points of a 200 x 200-span face with a trim of 500 spans: validation, tracing and listing, one core.
+// Making the face is excluded.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -7,6 +7,8 @@
 
 #include "trimming/constraint_points.h"
 #include "trimming/loops.h"
+#include "trimming/quadrature.h"
+#include "trimming/triangulation.h"
 
 namespace {
 
@@ -91,5 +93,30 @@ void point_in_material(benchmark::State& state) {
   benchmark::DoNotOptimize(inside);
 }
 BENCHMARK(point_in_material);
+
+// Rules of the same face, degree 4 x 4 (p = 2) or 6 x 6 (p = 3) on cut cells; tracing is excluded. `per_cut_cell`
+// counts the uncut cells' Gauss points too.
+void cut_quadrature(benchmark::State& state) {
+  TrimmedSurface face = wavy_face(40, 500);
+  validate_loops(face);
+  const TrimTopology topology = trace_trims(face);
+  const int p = static_cast<int>(state.range(0));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        quadrature(face, topology, {.degree_u = 2 * p, .degree_v = 2 * p, .gauss_u = p + 1, .gauss_v = p + 1}));
+  state.counters["cut_cells"] = static_cast<double>(topology.cut_cells.size());
+  state.counters["per_cut_cell"] =
+      benchmark::Counter(static_cast<double>(topology.cut_cells.size()),
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(cut_quadrature)->Arg(2)->Arg(3)->Unit(benchmark::kMillisecond);
+
+void triangulation(benchmark::State& state) {
+  TrimmedSurface face = wavy_face(40, 500);
+  validate_loops(face);
+  const TrimTopology topology = trace_trims(face);
+  for (auto _ : state) benchmark::DoNotOptimize(triangulate(face, topology));
+}
+BENCHMARK(triangulation)->Unit(benchmark::kMillisecond);
 
 }  // namespace
