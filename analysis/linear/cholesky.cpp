@@ -13,8 +13,8 @@
 namespace toile {
 namespace {
 
-// Below this many rows the envelope factor below is faster than CHOLMOD (README, "Measured").
-constexpr int envelope_rows = 300;
+// Below this many rows the envelope factor below is faster than CHOLMOD (README, "Constraints").
+constexpr int envelope_rows = 1000;
 
 void single_blas_thread() {
   using Setter = void (*)(int);
