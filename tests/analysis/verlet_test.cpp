@@ -186,7 +186,9 @@ TEST(Verlet, MovedPinsDoTheWorkThatTheClothTakesUp) {
   }
 }
 
-TEST(Verlet, HalvingTheStepMovesTheFreeCornerByLessThanHalfOfTheChangeBefore) {
+// First order up to 10 %, at 0.3 s. Strictly less than half is more than this scene gives at every moment: the taut edge
+// between the pins costs order (analysis/README.md, "Regularisation").
+TEST(Verlet, HalvingTheStepAboutHalvesTheChangeOfTheFreeCorner) {
   std::vector<Eigen::Vector3d> corner;
   for (double dt : {4e-3, 2e-3, 1e-3, 5e-4}) {
     Scene scene({.fixed = {0, 9}});
