@@ -47,8 +47,7 @@ std::array<bool, N> open_directions(const Eigen::Matrix<double, N, 1>& q, const 
                                     const Box<N>& box) {
   std::array<bool, N> open;
   for (int i = 0; i < N; ++i)
-    open[i] =
-        !(q[i] <= box.min[i] && gradient[i] >= 0) && !(q[i] >= box.max[i] && gradient[i] <= 0);
+    open[i] = !(q[i] <= box.min[i] && gradient[i] >= 0) && !(q[i] >= box.max[i] && gradient[i] <= 0);
   return open;
 }
 
@@ -91,8 +90,8 @@ double tangential_residual(const Local<N, Dim>& local, const std::array<bool, N>
 }
 
 // Projected Newton descent inside one box on which the piece is smooth [Bertsekas 1982]: the Hessian where it is
-// positive definite, else Gauss-Newton, else scaled steepest descent; each with an Armijo search along the projected arc.
-// `evaluate(q)` gives the Local; `size` is the length that the tolerance refers to.
+// positive definite, else Gauss-Newton, else scaled steepest descent; each with an Armijo search along the projected
+// arc. `evaluate(q)` gives the Local; `size` is the length that the tolerance refers to.
 template <int N, int Dim, class Evaluate>
 Minimum<N, Dim> descend(const Evaluate& evaluate, Eigen::Matrix<double, N, 1> q, const Box<N>& box, double size,
                         const Eigen::Matrix<double, Dim, 1>& target, const ClosestPointOptions& options) {
@@ -119,9 +118,7 @@ Minimum<N, Dim> descend(const Evaluate& evaluate, Eigen::Matrix<double, N, 1> q,
       Parameter step;
       if (attempt == 2) {
         for (int i = 0; i < N; ++i)
-          step[i] = open[i] && local.gauss_newton(i, i) > 0
-                        ? -local.gradient[i] / (N * local.gauss_newton(i, i))
-                        : 0.0;
+          step[i] = open[i] && local.gauss_newton(i, i) > 0 ? -local.gradient[i] / (N * local.gauss_newton(i, i)) : 0.0;
       } else {
         if (!solve_open<N>(attempt == 0 ? local.hessian : local.gauss_newton, local.gradient, open, step)) continue;
         step = -step;
@@ -134,8 +131,9 @@ Minimum<N, Dim> descend(const Evaluate& evaluate, Eigen::Matrix<double, N, 1> q,
         const double slope = local.gradient.dot(trial - q);
         const bool descends = slope < 0 && next.f <= local.f + 1e-4 * slope;
         // Near the minimum f no longer tells points apart, while the residual still does.
-        const bool level = std::abs(next.f - local.f) <= 8 * epsilon * local.f + grain * std::sqrt(2 * local.f) &&
-                           tangential_residual<N, Dim>(next, open_directions<N>(trial, next.gradient, box)) < residual / 2;
+        const bool level =
+            std::abs(next.f - local.f) <= 8 * epsilon * local.f + grain * std::sqrt(2 * local.f) &&
+            tangential_residual<N, Dim>(next, open_directions<N>(trial, next.gradient, box)) < residual / 2;
         if (!descends && !level) continue;
         q = trial;
         local = next;
@@ -176,8 +174,7 @@ Minimum<N, Dim> descend_pieces(const Evaluate& evaluate, const Eigen::Matrix<dou
                                const std::array<std::vector<double>, N>& ends, double size,
                                const Eigen::Matrix<double, Dim, 1>& target, const ClosestPointOptions& options) {
   std::array<int, N> piece;
-  for (int i = 0; i < N; ++i)
-    piece[i] = piece_of(ends[i], start[i]);
+  for (int i = 0; i < N; ++i) piece[i] = piece_of(ends[i], start[i]);
   const auto box_of = [&](const std::array<int, N>& p) {
     Box<N> box;
     for (int i = 0; i < N; ++i) {
@@ -202,15 +199,14 @@ Minimum<N, Dim> descend_pieces(const Evaluate& evaluate, const Eigen::Matrix<dou
       choices[i] = 0;
       shifts[i][choices[i]++] = 0;
       if (best.q[i] <= box.min[i] && piece[i] > 0) shifts[i][choices[i]++] = -1;
-      if (best.q[i] >= box.max[i] && piece[i] + 2 < static_cast<int>(ends[i].size()))
-        shifts[i][choices[i]++] = 1;
+      if (best.q[i] >= box.max[i] && piece[i] + 2 < static_cast<int>(ends[i].size())) shifts[i][choices[i]++] = 1;
     }
     int combinations = 1;
     for (int c : choices) combinations *= c;
     for (int c = 1; c < combinations && !nearer; ++c) {
       std::array<int, N> other = piece;
       for (int i = 0, rest = c; i < N; ++i) {
-          other[i] += shifts[i][rest % choices[i]];
+        other[i] += shifts[i][rest % choices[i]];
         rest /= choices[i];
       }
       Minimum<N, Dim> next = run(other, best.q);
@@ -256,8 +252,7 @@ std::vector<Candidate> local_minima(const std::vector<double>& u, const std::vec
       for (int b = std::max(j - 1, 0); b <= std::min(j + 1, nv - 1) && lowest; ++b)
         for (int a = std::max(i - 1, 0); a <= std::min(i + 1, nu - 1); ++a)
           // Of equal neighbours the first counts.
-          if (const double other = f[a + nu * b];
-              other < value || (other == value && a + nu * b < i + nu * j)) {
+          if (const double other = f[a + nu * b]; other < value || (other == value && a + nu * b < i + nu * j)) {
             lowest = false;
             break;
           }
@@ -268,15 +263,16 @@ std::vector<Candidate> local_minima(const std::vector<double>& u, const std::vec
   return found;
 }
 
-// The proof stops where it has shown that nothing is nearer by more than this, relative to the size of the geometry: far
-// enough above the square root of the rounding of squared distances.
+// The proof stops where it has shown that nothing is nearer by more than this, relative to the size of the geometry:
+// far enough above the square root of the rounding of squared distances.
 constexpr double proof_slack = 1e-7;
 
 // Subdivisions spent on it. A few hundred do unless the target is as near to a whole region (the centre of a sphere).
 constexpr int most_subdivisions = 4000;
 
 // The squared distance N / W^2 to the target over one parameter rectangle, as Bernstein coefficients of degree
-// (du, dv), u fastest. Since W^2 has positive coefficients, N / W^2 >= min_k N_k / (W^2)_k; `bound` is the root of that.
+// (du, dv), u fastest. Since W^2 has positive coefficients, N / W^2 >= min_k N_k / (W^2)_k; `bound` is the root of
+// that.
 struct Piece {
   Interval u, v;
   int du = 0, dv = 0;
@@ -486,9 +482,8 @@ ClosestPoint closest_point(const NurbsSurface& surface, const Eigen::Vector3d& t
     std::vector<Piece> pieces;
     for (int sv : surface.v().spans())
       for (int su : surface.u().spans()) {
-        const Eigen::MatrixXd net = local_net(surface, target, pu + 1, pv + 1, [&](int a, int b) {
-          return surface.index(su - pu + a, sv - pv + b);
-        });
+        const Eigen::MatrixXd net = local_net(surface, target, pu + 1, pv + 1,
+                                              [&](int a, int b) { return surface.index(su - pu + a, sv - pv + b); });
         if (hull_distance(net) >= distance - slack) continue;
         const Eigen::MatrixXd in_u = detail::bezier_extraction(surface.u(), su);
         const Eigen::MatrixXd in_v = detail::bezier_extraction(surface.v(), sv);
@@ -502,8 +497,8 @@ ClosestPoint closest_point(const NurbsSurface& surface, const Eigen::Vector3d& t
       }
     lower_bound = bound_below(std::move(pieces), distance, slack, improve);
   }
-  return {best->q[0], best->q[1], best->local.x,   std::sqrt(2 * best->local.f), best->residual,
-          iterations, best->converged, lower_bound};
+  return {best->q[0],     best->q[1], best->local.x,   std::sqrt(2 * best->local.f),
+          best->residual, iterations, best->converged, lower_bound};
 }
 
 template <int Dim>
@@ -557,7 +552,7 @@ CurveClosestPoint<Dim> closest_point(const NurbsCurve<Dim>& curve, const Eigen::
     }
     lower_bound = bound_below(std::move(pieces), distance, slack, improve);
   }
-  return {best->q[0],      best->local.x,   std::sqrt(2 * best->local.f), best->residual, iterations,
+  return {best->q[0],      best->local.x, std::sqrt(2 * best->local.f), best->residual, iterations,
           best->converged, lower_bound};
 }
 

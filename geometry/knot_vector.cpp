@@ -25,8 +25,8 @@ void check(int degree, const std::vector<double>& knots) {
                           text(knots[i - 1]));
     run = i > 0 && knots[i] == knots[i - 1] ? run + 1 : 1;
     if (run > degree + 1)
-      throw GeometryError("knot " + std::to_string(i) + " = " + text(knots[i]) + " occurs more than degree + 1 = " +
-                          std::to_string(degree + 1) + " times");
+      throw GeometryError("knot " + std::to_string(i) + " = " + text(knots[i]) +
+                          " occurs more than degree + 1 = " + std::to_string(degree + 1) + " times");
   }
   if (!(knots[degree] < knots[count - degree - 1]))
     throw GeometryError("the domain from knot " + std::to_string(degree) + " to knot " +
@@ -42,7 +42,9 @@ KnotVector::KnotVector(int degree, std::vector<double> knots) : degree_(degree),
   check(degree_, knots_);
 }
 
-Interval KnotVector::domain() const { return {knots_[degree_], knots_[control_point_count()]}; }
+Interval KnotVector::domain() const {
+  return {knots_[degree_], knots_[control_point_count()]};
+}
 
 bool KnotVector::clamped() const {
   return knots_.front() == knots_[degree_] && knots_.back() == knots_[control_point_count()];

@@ -46,7 +46,8 @@ class KnotVector {
   // How often u occurs as a knot, compared bitwise; 0 for none.
   int multiplicity(double u) const;
 
-  // Parameter where the control point's function is centred: mean of knots[i+1..i+p] (knot average for p = 0: mid-span).
+  // Parameter where the control point's function is centred: mean of knots[i+1..i+p] (knot average for p = 0:
+  // mid-span).
   double greville(int i) const;
 
   bool operator==(const KnotVector&) const = default;

@@ -160,8 +160,10 @@ LineNet elevate_degree(const LineNet& net, int degree) {
     };
     int begin = piece_at(first), end = piece_at(last);
     if (begin == end) {
-      if (knots[j + degree + 1] > last) ++end;
-      else --begin;
+      if (knots[j + degree + 1] > last)
+        ++end;
+      else
+        --begin;
     }
     int best = begin;
     for (int k = begin; k < end; ++k)
@@ -188,7 +190,7 @@ LineNet without_knot(const LineNet& net, double knot) {
   const int first = r - p, last = r - m;
 
   Rows rows(net.rows.rows() - 1, net.rows.cols());
-  rows.topRows(first) = net.rows.topRows(first);                                        // 0 .. first - 1
+  rows.topRows(first) = net.rows.topRows(first);                                          // 0 .. first - 1
   rows.bottomRows(rows.rows() - last) = net.rows.bottomRows(net.rows.rows() - last - 1);  // last .. end
   // The equations are net[i] = a_i rows[i] + (1 - a_i) rows[i - 1], i = first .. last; unknown rows[first .. last - 1].
   int i = first, j = last;

@@ -1,5 +1,5 @@
-// Changes of one knot vector, whatever hangs on it: the common core of refine.h for curves and for either direction of a
-// surface. Internal to geometry/.
+// Changes of one knot vector, whatever hangs on it: the common core of refine.h for curves and for either direction of
+// a surface. Internal to geometry/.
 #pragma once
 
 #include <Eigen/Core>

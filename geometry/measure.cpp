@@ -56,8 +56,7 @@ double refined_area(const NurbsSurface& surface, const Cell& cell, double whole,
   for (std::size_t k = 0; k < 4; ++k) sum += areas[k] = cell_area(surface, parts[k]);
   if (std::abs(sum - whole) <= tolerance || depth >= 20) return sum;
   double result = 0;
-  for (std::size_t k = 0; k < 4; ++k)
-    result += refined_area(surface, parts[k], areas[k], tolerance / 4, depth + 1);
+  for (std::size_t k = 0; k < 4; ++k) result += refined_area(surface, parts[k], areas[k], tolerance / 4, depth + 1);
   return result;
 }
 

@@ -18,12 +18,12 @@ Eigen::AlignedBox3d bounding_box(const NurbsSurface& surface);
 double surface_area(const NurbsSurface& surface, double relative_tolerance = 1e-10);
 
 // The point of the surface nearest to `target`. `residual` is the length of the part of x - target that lies in those
-// tangent directions which the border leaves open; `converged` says whether it fell below the tolerance (or the rounding
-// of the coordinates). At a fold (a C0 knot) it means that neither side leads nearer. What did not converge is still the
-// best found. Without a `start` the whole surface is searched: no point of it is nearer than `lower_bound`, which comes
-// within 1e-7 of the surface's size of `distance` unless nearly all of a region is as near (then see how far it came).
-// With a `start` the nearest point is a local one and lower_bound is 0. Throws GeometryError for a target or start that
-// isn't finite.
+// tangent directions which the border leaves open; `converged` says whether it fell below the tolerance (or the
+// rounding of the coordinates). At a fold (a C0 knot) it means that neither side leads nearer. What did not converge is
+// still the best found. Without a `start` the whole surface is searched: no point of it is nearer than `lower_bound`,
+// which comes within 1e-7 of the surface's size of `distance` unless nearly all of a region is as near (then see how
+// far it came). With a `start` the nearest point is a local one and lower_bound is 0. Throws GeometryError for a target
+// or start that isn't finite.
 struct ClosestPoint {
   double u = 0, v = 0;
   Eigen::Vector3d x = Eigen::Vector3d::Zero();

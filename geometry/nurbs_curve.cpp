@@ -106,7 +106,8 @@ Curve2 circular_arc(const Eigen::Vector2d& centre, double radius, double a, doub
   for (int i = 0; i <= 2 * pieces; ++i) {
     const double angle = i == 2 * pieces ? b : a + half * i;
     const bool corner = i % 2 == 1;
-    points.col(i) = centre + (corner ? radius / std::cos(half) : radius) * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    points.col(i) =
+        centre + (corner ? radius / std::cos(half) : radius) * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     if (corner) weights[i] = std::cos(half);
   }
   for (int i = 1; i < pieces; ++i) knots.insert(knots.end(), 2, static_cast<double>(i) / pieces);
@@ -142,8 +143,7 @@ double arc_length(const NurbsCurve<Dim>& curve, Interval range, double relative_
   for (std::size_t i = 0; i < pieces; ++i) estimate += first[i] = gauss8(speed, ends[i], ends[i + 1]);
   const double tolerance = std::max(relative_tolerance, 1e-15) * std::abs(estimate) / static_cast<double>(pieces);
   double length = 0;
-  for (std::size_t i = 0; i < pieces; ++i)
-    length += integrate(speed, ends[i], ends[i + 1], first[i], tolerance, 0);
+  for (std::size_t i = 0; i < pieces; ++i) length += integrate(speed, ends[i], ends[i + 1], first[i], tolerance, 0);
   return length;
 }
 

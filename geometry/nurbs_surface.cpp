@@ -75,8 +75,7 @@ SurfaceJet evaluate_on_span(const NurbsSurface& surface, int span_u, int span_v,
   for (int b = 0; b <= bv.degree; ++b) {
     Eigen::Vector4d r0 = Eigen::Vector4d::Zero(), r1 = r0, r2 = r0;
     for (int a = 0; a <= bu.degree; ++a) {
-      const Eigen::Vector4d point =
-          detail::homogeneous_point(surface, surface.index(bu.first + a, bv.first + b));
+      const Eigen::Vector4d point = detail::homogeneous_point(surface, surface.index(bu.first + a, bv.first + b));
       r0 += bu.value[0][a] * point;
       r1 += bu.value[1][a] * point;
       r2 += bu.value[2][a] * point;

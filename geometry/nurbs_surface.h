@@ -51,8 +51,8 @@ struct SurfaceJet {
   Eigen::Vector3d x, u, v, uu, uv, vv;
 };
 SurfaceJet evaluate(const NurbsSurface& surface, double u, double v);
-// The same of the piece on the named spans (knot indices), continued where the point lies outside: one-sided derivatives
-// at knots.
+// The same of the piece on the named spans (knot indices), continued where the point lies outside: one-sided
+// derivatives at knots.
 SurfaceJet evaluate_on_span(const NurbsSurface& surface, int span_u, int span_v, double u, double v);
 
 // The nonzero (rational) surface functions at a parameter with first and second derivatives.

@@ -29,7 +29,8 @@ LineNet to_net(const NurbsCurve<Dim>& curve) {
 
 // Equal weights are kept, so that a file's numbers come back.
 std::vector<double> equal_weights(const std::vector<double>& weights, Eigen::Index count) {
-  return weights.empty() ? std::vector<double>() : std::vector<double>(static_cast<std::size_t>(count), weights.front());
+  return weights.empty() ? std::vector<double>()
+                         : std::vector<double>(static_cast<std::size_t>(count), weights.front());
 }
 
 template <int Dim>
@@ -74,7 +75,8 @@ NurbsSurface to_surface(LineNet net, const NurbsSurface& like, Direction d) {
       like.rational() ? std::vector<double>(static_cast<std::size_t>(nu * nv)) : equal_weights(like.weights(), nu * nv);
   for (int j = 0; j < nv; ++j)
     for (int i = 0; i < nu; ++i) {
-      const auto entry = along_u ? net.rows.row(i).segment(width * j, width) : net.rows.row(j).segment(width * i, width);
+      const auto entry =
+          along_u ? net.rows.row(i).segment(width * j, width) : net.rows.row(j).segment(width * i, width);
       const int k = i + nu * j;
       points.col(k) = entry.head<3>().transpose();
       if (width == 4) {
@@ -117,8 +119,7 @@ double deviation_bound(const Rows& a, const Rows& b, bool rational) {
   for (Eigen::Index i = 0; i < a.rows(); ++i)
     for (Eigen::Index g = 0; g < groups; ++g) {
       const double wa = a(i, g * width + Dim), wb = b(i, g * width + Dim);
-      const Eigen::RowVectorXd move =
-          a.row(i).segment(g * width, Dim) / wa - b.row(i).segment(g * width, Dim) / wb;
+      const Eigen::RowVectorXd move = a.row(i).segment(g * width, Dim) / wa - b.row(i).segment(g * width, Dim) / wb;
       bound = std::max(bound, (wb * move.norm() + diameter * std::abs(wa - wb)) / wa);
     }
   return bound;
@@ -151,8 +152,9 @@ Removed try_removal(const LineNet& net, double knot, bool rational) {
     again.topRows(joined + 1) = without.rows.topRows(joined + 1);
     again.bottomRows(again.rows() - joined - 1) = without.rows.bottomRows(without.rows.rows() - joined);
   }
-  const double bound = rational && !weights_positive<Dim>(without.rows) ? std::numeric_limits<double>::infinity()
-                                                                        : deviation_bound<Dim>(net.rows, again, rational);
+  const double bound = rational && !weights_positive<Dim>(without.rows)
+                           ? std::numeric_limits<double>::infinity()
+                           : deviation_bound<Dim>(net.rows, again, rational);
   return {std::move(without), bound};
 }
 
@@ -207,8 +209,8 @@ std::optional<NurbsCurve<Dim>> remove_knot(const NurbsCurve<Dim>& curve, double 
   return to_curve(std::move(removed.net), curve);
 }
 
-std::optional<NurbsSurface> remove_knot(const NurbsSurface& surface, Direction direction, double knot,
-                                        double tolerance, double* deviation) {
+std::optional<NurbsSurface> remove_knot(const NurbsSurface& surface, Direction direction, double knot, double tolerance,
+                                        double* deviation) {
   check_removable(surface.knots(direction), knot);
   Removed removed = try_removal<3>(to_net(surface, direction), knot, surface.rational());
   if (!std::isfinite(removed.bound) || removed.bound > tolerance) return std::nullopt;
@@ -243,8 +245,7 @@ std::vector<BezierPatch> bezier_patches(const NurbsSurface& surface) {
     const Rows& strip = strips[su];
     Rows turned(surface.count_v(), width * (pu + 1));
     for (int j = 0; j < surface.count_v(); ++j)
-      for (int i = 0; i <= pu; ++i)
-        turned.row(j).segment(width * i, width) = strip.row(i).segment(width * j, width);
+      for (int i = 0; i <= pu; ++i) turned.row(j).segment(width * i, width) = strip.row(i).segment(width * j, width);
     const std::vector<Rows> cells = detail::bezier_rows({surface.v(), std::move(turned)});
     for (std::size_t sv = 0; sv < cells.size(); ++sv) {
       BezierPatch& patch = patches[su + strips.size() * sv];
@@ -288,13 +289,13 @@ NurbsCurve<Dim> reversed(const NurbsCurve<Dim>& curve) {
           std::vector<double>(curve.weights().rbegin(), curve.weights().rend())};
 }
 
-#define TOILE_INSTANTIATE(Dim)                                                                      \
-  template NurbsCurve<Dim> insert_knots(const NurbsCurve<Dim>&, std::span<const double>);           \
-  template NurbsCurve<Dim> clamp(const NurbsCurve<Dim>&);                                           \
-  template NurbsCurve<Dim> elevate_degree(const NurbsCurve<Dim>&, int);                             \
-  template std::optional<NurbsCurve<Dim>> remove_knot(const NurbsCurve<Dim>&, double, double);      \
-  template std::vector<BezierCurve<Dim>> bezier_pieces(const NurbsCurve<Dim>&);                     \
-  template NurbsCurve<Dim> sub_curve(const NurbsCurve<Dim>&, Interval);                             \
+#define TOILE_INSTANTIATE(Dim)                                                                 \
+  template NurbsCurve<Dim> insert_knots(const NurbsCurve<Dim>&, std::span<const double>);      \
+  template NurbsCurve<Dim> clamp(const NurbsCurve<Dim>&);                                      \
+  template NurbsCurve<Dim> elevate_degree(const NurbsCurve<Dim>&, int);                        \
+  template std::optional<NurbsCurve<Dim>> remove_knot(const NurbsCurve<Dim>&, double, double); \
+  template std::vector<BezierCurve<Dim>> bezier_pieces(const NurbsCurve<Dim>&);                \
+  template NurbsCurve<Dim> sub_curve(const NurbsCurve<Dim>&, Interval);                        \
   template NurbsCurve<Dim> reversed(const NurbsCurve<Dim>&);
 TOILE_INSTANTIATE(2)
 TOILE_INSTANTIATE(3)

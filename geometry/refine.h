@@ -13,8 +13,8 @@
 
 namespace toile {
 
-// Knots may repeat; each must lie in the domain and may reach multiplicity p at most in the interior. Existing knots stay
-// bitwise. Unclamped input stays unclamped. [Piegl & Tiller 1997, A5.4 (Boehm)]
+// Knots may repeat; each must lie in the domain and may reach multiplicity p at most in the interior. Existing knots
+// stay bitwise. Unclamped input stays unclamped. [Piegl & Tiller 1997, A5.4 (Boehm)]
 template <int Dim>
 NurbsCurve<Dim> insert_knots(const NurbsCurve<Dim>& curve, std::span<const double> added);
 NurbsSurface insert_knots(const NurbsSurface& surface, Direction direction, std::span<const double> added);
@@ -76,11 +76,17 @@ NurbsCurve<Dim> sub_curve(const NurbsCurve<Dim>& curve, Interval range);
 template <int Dim>
 NurbsCurve<Dim> reversed(const NurbsCurve<Dim>& curve);
 
-// Refinement to analysis resolution (design.md, "Refinement"). The effective degree is the larger of the surface's and
-// the asked one, per direction; a flat affine panel takes exactly what is asked. `span` [same unit as the net] splits each span of the
-// surface into ceil(length / span) equal parts, length being its longest iso-curve; `spans` and `control_points` ask for
-// totals per direction. The knots returned contain the surface's own distinct knots. Knots whose continuity is below C1
-// are removed where the geometry stays within `tolerance`.
+// Refinement to analysis resolution (design.md, "Refinement"), clamped.
+//   (1) Degree per direction: the larger of the surface's and the asked one (at least 2 when one is asked). A flat affine
+//       panel takes exactly what is asked, and the larger of its own and 2 when nothing is.
+//   (2) `span` [unit of the net] splits each span of the surface into ceil(length / span) equal parts, length being its
+//       longest iso-curve (a multiple to 1e-9 isn't split once more); `spans` and `control_points` ask for totals per
+//       direction, shared by length. At most one of the three may be set.
+//   (3) The surface's own distinct knots stay, bitwise; only where a flat affine panel is asked for fewer spans than it
+//       has does it get equal ones.
+//   (4) Where the continuity is below C1, knots are removed as far as the surface stays within `tolerance` (or rounding,
+//       256 epsilon of the net's size); those that stay C0 are listed.
+//   (5) A flat affine panel that has the resulting knots already comes back unchanged.
 struct RefineOptions {
   std::optional<int> degree = {};
   std::optional<double> span = {};
@@ -91,10 +97,10 @@ struct RefineOptions {
 struct Refinement {
   NurbsSurface surface;
   bool rebuilt_flat = false;
-  double deviation = 0;                                   // largest move of the surface, unit of the net
-  std::vector<std::pair<Direction, double>> kinks;        // interior knots that stay C0 (multiplicity >= degree)
+  double deviation = 0;                             // largest move of the surface, unit of the net
+  std::vector<std::pair<Direction, double>> kinks;  // interior knots that stay C0 (multiplicity >= degree)
 };
-// Throws GeometryError where the totals asked for can't be had on the surface's spans.
+// Throws GeometryError for options out of range, and where the totals asked for can't be had on the surface's spans.
 Refinement refine(const NurbsSurface& surface, const RefineOptions& options);
 
 }  // namespace toile

@@ -23,7 +23,9 @@ double net_size(const NurbsSurface& surface) {
   return (surface.points().rowwise().maxCoeff() - surface.points().rowwise().minCoeff()).norm();
 }
 
-Eigen::Vector3d at(const AffinePatch& patch, double u, double v) { return patch.origin + u * patch.du + v * patch.dv; }
+Eigen::Vector3d at(const AffinePatch& patch, double u, double v) {
+  return patch.origin + u * patch.du + v * patch.dv;
+}
 
 // Largest distance between the polynomial surface and the map: that of the control points from the map at Greville
 // abscissae, since such a net reproduces the map.
@@ -56,8 +58,7 @@ double rational_deviation(const NurbsSurface& surface, const AffinePatch& patch)
             const double share_u = static_cast<double>(a == 0 ? pu + 1 - i : i) / (pu + 1);
             const double share_v = static_cast<double>(b == 0 ? pv + 1 - j : j) / (pv + 1);
             const int k = ii + (pu + 1) * jj;
-            coefficient +=
-                share_u * share_v * bezier.weights[k] * (bezier.points.col(k) - (l00 + a * lu + b * lv));
+            coefficient += share_u * share_v * bezier.weights[k] * (bezier.points.col(k) - (l00 + a * lu + b * lv));
           }
         numerator = std::max(numerator, coefficient.norm());
       }
@@ -128,7 +129,9 @@ NurbsSurface rebuild(const AffinePatch& patch, KnotVector u, KnotVector v) {
 
 namespace {
 
-std::string name(Direction d) { return d == Direction::u ? "u" : "v"; }
+std::string name(Direction d) {
+  return d == Direction::u ? "u" : "v";
+}
 
 // Length of the longest iso-curve over each span of direction d, found on nine lines of every span of the other.
 std::vector<double> span_lengths(const NurbsSurface& surface, Direction d) {
@@ -203,8 +206,8 @@ std::optional<int> asked_total(const RefineOptions& options, Direction d, int fe
   if (options.spans) {
     const int total = (*options.spans)[k];
     if (total < fewest)
-      throw GeometryError("direction " + name(d) + " was asked for " + std::to_string(total) +
-                          " spans; at least " + std::to_string(fewest) + " are possible");
+      throw GeometryError("direction " + name(d) + " was asked for " + std::to_string(total) + " spans; at least " +
+                          std::to_string(fewest) + " are possible");
     return total;
   }
   if (options.control_points) {

@@ -35,11 +35,11 @@ struct TrimLoop {
 struct TrimmedSurface {
   std::string name;
   NurbsSurface surface;
-  std::vector<TrimLoop> loops;   // never empty after reading: a face without a trim has its natural loop
-  bool natural_bounds = false;   // the loop is the border of the domain, made by natural_loop()
+  std::vector<TrimLoop> loops;  // never empty after reading: a face without a trim has its natural loop
+  bool natural_bounds = false;  // the loop is the border of the domain, made by natural_loop()
   double metres_per_unit = 1;
-  double resolution = 0;         // smallest length that the file means (IGES global field 19), unit of the net
-  std::string source;            // where it came from, for messages: "skirt.igs:412: entity 144"
+  double resolution = 0;  // smallest length that the file means (IGES global field 19), unit of the net
+  std::string source;     // where it came from, for messages: "skirt.igs:412: entity 144"
 };
 
 // Border of the domain as one loop of four lines: curves 0 to 3 from v = min, counter-clockwise.

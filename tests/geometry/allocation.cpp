@@ -17,8 +17,12 @@ void* operator new(std::size_t size) {
   if (void* p = std::malloc(size ? size : 1)) return p;
   throw std::bad_alloc();
 }
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p) noexcept {
+  std::free(p);
+}
+void operator delete(void* p, std::size_t) noexcept {
+  std::free(p);
+}
 
 namespace toile {
 namespace {
@@ -33,7 +37,12 @@ long allocations_of(Call&& call) {
 TEST(Evaluation, AllocatesNothing) {
   SCOPED_TRACE("seed 41");
   test::Random random(41);
-  ASSERT_GT(allocations_of([] { std::vector<double> v(100); EXPECT_EQ(v[3], 0); }), 0) << "the counter doesn't count";
+  ASSERT_GT(allocations_of([] {
+              std::vector<double> v(100);
+              EXPECT_EQ(v[3], 0);
+            }),
+            0)
+      << "the counter doesn't count";
   for (auto kind : {test::Kind::polynomial, test::Kind::rational})
     for (int degree : {1, 2, 3, 7}) {
       const NurbsSurface s = test::random_surface(random, degree, degree, 3, test::Ends::unclamped, kind);

@@ -37,8 +37,8 @@ TEST(Basis, ValuesFollowTheDefinition) {
     ASSERT_EQ(basis.degree, knots.degree());
     ASSERT_EQ(basis.first, span - knots.degree());
     for (int j = 0; j <= knots.degree(); ++j)
-      ASSERT_TRUE(test::near_rel(basis.value[0][j], definition(knots, basis.first + j, knots.degree(), span, u), 1e-13,
-                                 1e-15));
+      ASSERT_TRUE(
+          test::near_rel(basis.value[0][j], definition(knots, basis.first + j, knots.degree(), span, u), 1e-13, 1e-15));
   });
 }
 
@@ -69,8 +69,8 @@ TEST(Basis, DerivativesMatchCentralDifferences) {
       double size = 1;
       for (int j = 0; j <= at.degree; ++j) size = std::max(size, std::abs(at.value[k][j]));
       for (int j = 0; j <= at.degree; ++j)
-        ASSERT_TRUE(test::near_rel(at.value[k][j], (high.value[k - 1][j] - low.value[k - 1][j]) / (2 * h), 0,
-                                   2e-7 * size))
+        ASSERT_TRUE(
+            test::near_rel(at.value[k][j], (high.value[k - 1][j] - low.value[k - 1][j]) / (2 * h), 0, 2e-7 * size))
             << "degree " << at.degree << " derivative " << k << " function " << j;
     }
   });

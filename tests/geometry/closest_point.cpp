@@ -151,8 +151,8 @@ TEST(ClosestPoint, SaysWhenItDidNotConverge) {
   EXPECT_GT(cut_short.residual, 1e-6);
   options.max_iterations = 60;
   EXPECT_TRUE(closest_point(test::sphere_octant(), target, options).converged);
-  test::expect_geometry_error(
-      [] { closest_point(NurbsSurface(), Eigen::Vector3d(0, std::nan(""), 0)); }, "target", "not finite");
+  test::expect_geometry_error([] { closest_point(NurbsSurface(), Eigen::Vector3d(0, std::nan(""), 0)); }, "target",
+                              "not finite");
 }
 
 template <class Dim>

@@ -1,5 +1,5 @@
-// Random knot vectors, curves and surfaces for law tests. Every test states its seed with SCOPED_TRACE, so that a failure
-// prints it.
+// Random knot vectors, curves and surfaces for law tests. Every test states its seed with SCOPED_TRACE, so that a
+// failure prints it.
 #pragma once
 
 #include <algorithm>
@@ -85,8 +85,7 @@ double largest_distance(const NurbsCurve<Dim>& a, const NurbsCurve<Dim>& b) {
 inline double largest_distance(const NurbsSurface& a, const NurbsSurface& b) {
   double largest = 0;
   for (double u : spread(a.u().domain(), 33, a.u().breaks()))
-    for (double v : spread(a.v().domain(), 33, a.v().breaks()))
-      largest = std::max(largest, (a(u, v) - b(u, v)).norm());
+    for (double v : spread(a.v().domain(), 33, a.v().breaks())) largest = std::max(largest, (a(u, v) - b(u, v)).norm());
   return largest;
 }
 

@@ -52,7 +52,8 @@ TYPED_TEST(CurveRepresentation, InsertionKeepsTheCurveAndTheOldKnots) {
     for (double b : curve.knots().breaks())
       if (curve.knots().multiplicity(b) < curve.degree()) added.push_back(b);  // the ends of unclamped domains too
     const auto finer = insert_knots(curve, added);
-    EXPECT_EQ(finer.knots().control_point_count(), curve.knots().control_point_count() + static_cast<int>(added.size()));
+    EXPECT_EQ(finer.knots().control_point_count(),
+              curve.knots().control_point_count() + static_cast<int>(added.size()));
     std::vector<double> expected(curve.knots().knots().begin(), curve.knots().knots().end());
     expected.insert(expected.end(), added.begin(), added.end());
     std::ranges::sort(expected);
@@ -201,7 +202,8 @@ TYPED_TEST(CurveRepresentation, BezierPiecesReproduceTheCurve) {
       ASSERT_EQ(pieces[k].points.cols(), curve.degree() + 1);
       ASSERT_EQ(pieces[k].weights.size(), curve.degree() + 1);
       for (double t : test::spread(pieces[k].range, 20))
-        EXPECT_LT((de_casteljau<TestFixture::dimension>(pieces[k], t) - curve(t)).norm(), rounding * test::size_of(curve));
+        EXPECT_LT((de_casteljau<TestFixture::dimension>(pieces[k], t) - curve(t)).norm(),
+                  rounding * test::size_of(curve));
     }
   });
 }
@@ -217,8 +219,7 @@ TYPED_TEST(CurveRepresentation, PartsAreTheCurveOverTheirRange) {
       EXPECT_TRUE(part.knots().clamped());
       EXPECT_EQ(part.domain().min, range.min);
       EXPECT_EQ(part.domain().max, range.max);
-      for (double t : test::spread(range, 40))
-        EXPECT_LT((part(t) - curve(t)).norm(), rounding * test::size_of(curve));
+      for (double t : test::spread(range, 40)) EXPECT_LT((part(t) - curve(t)).norm(), rounding * test::size_of(curve));
       EXPECT_LT((part.points().col(0) - curve(range.min)).norm(), rounding * test::size_of(curve));
     }
     expect_geometry_error([&] { sub_curve(curve, {a, a}); }, "range");

@@ -113,8 +113,8 @@ TEST(Refine, GivesAFlatPanelExactlyWhatWasAsked) {
 TEST(Refine, LowersTheDegreeOfABicubicFlatPanel) {
   SCOPED_TRACE("seed 102");
   test::Random random(102);
-  const NurbsSurface bicubic =
-      rebuild(plane, test::random_knots(random, 3, 4, Ends::clamped), test::random_knots(random, 3, 2, Ends::unclamped));
+  const NurbsSurface bicubic = rebuild(plane, test::random_knots(random, 3, 4, Ends::clamped),
+                                       test::random_knots(random, 3, 2, Ends::unclamped));
   const Refinement quadratic = refine(bicubic, {.degree = 2});
   for (Direction d : directions) {
     EXPECT_EQ(quadratic.surface.knots(d).degree(), 2);
@@ -144,8 +144,11 @@ TEST(Refine, SplitsTheSpansOfAFlatPanelAndKeepsItsKnots) {
   // Fewer spans than the panel has: the map is affine, so equal spans serve.
   EXPECT_EQ(refine(grid, {.spans = {{1, 1}}}).surface.u(), uniform_knots(2, 1));
   expect_geometry_error([&] { refine(grid, {.spans = {{0, 3}}}); }, "direction u", "0 spans", "at least 1");
-  expect_geometry_error([&] { refine(grid, {.degree = 3, .control_points = {{9, 3}}}); }, "direction v",
-                        "3 control points", "at least 4");
+  expect_geometry_error(
+      [&] {
+        refine(grid, {.degree = 3, .control_points = {{9, 3}}});
+      },
+      "direction v", "3 control points", "at least 4");
 }
 
 TEST(Refine, KeepsAFileThatHasTheKnotsAskedFor) {
@@ -168,6 +171,10 @@ TEST(Refine, SpanSplitsEachSpanByItsLongestIsoCurve) {
   EXPECT_EQ(finer.surface.u().spans().size(), length(1, std::sqrt(6)) + length(3, std::sqrt(6)));
   EXPECT_EQ(finer.surface.v().spans().size(), 3u) << "3 / 1 is three, not four";
   expect_contains(finer.surface.u(), grid.u());
+
+  // 0.1 * 3 is a little more than 0.3 in doubles; that doesn't make a fourth part.
+  const NurbsSurface tenth = rebuild({{0, 0, 0}, {0.1, 0, 0}, {0, 1, 0}}, KnotVector(1, {0, 0, 3, 3}), KnotVector());
+  EXPECT_EQ(refine(tenth, {.span = 0.1}).surface.u().spans().size(), 3u);
 
   // A cone strip: the longer rim counts.
   NurbsSurface cone = test::cylinder(1, 2);
@@ -202,8 +209,11 @@ TEST(Refine, GivesCurvedSurfacesTheTotalsAskedFor) {
         for (Direction d : directions) expect_contains(r->surface.knots(d), s.knots(d));
       }
       expect_geometry_error([&] { refine(s, {.spans = {{3, 9}}}); }, "direction u", "3 spans", "at least 4");
-      expect_geometry_error([&] { refine(s, {.control_points = {{9, 6}}}); }, "direction v", "6 control points",
-                            "at least 7");
+      expect_geometry_error(
+          [&] {
+            refine(s, {.control_points = {{9, 6}}});
+          },
+          "direction v", "6 control points", "at least 7");
     }
 }
 
