@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/error.h"
+
 namespace toile {
 namespace {
 
@@ -201,7 +203,7 @@ void isolate(std::vector<T> b, double lo, double hi, int depth, int max_depth, s
     out.push_back({lo, hi, true, nullptr});
     return;
   }
-  if (depth == max_depth && count > 1) throw TooDeep();
+  if (depth >= max_depth && count > 1) throw TooDeep();
   const double mid = lo + (hi - lo) / 2;
   if (!(lo < mid && mid < hi)) throw TooDeep();
   const std::vector<T> right = halve(b);
@@ -347,7 +349,11 @@ std::vector<LineRoot> algebraic_roots(const Polynomial& p) {
     if (factors[m].size() < 2) continue;
     const auto factor = std::make_shared<const ExactFactor>(factors[m]);
     std::vector<LineRoot> found;
-    isolate(bernstein_basis(factors[m]), 0.0, 1.0, 0, 2000, found);
+    try {
+      isolate(bernstein_basis(factors[m]), 0.0, 1.0, 0, 2000, found);
+    } catch (const TooDeep&) {
+      throw GeometryError("a trim curve meets a knot line at parameters closer than doubles can tell");
+    }
     for (LineRoot& root : found) {
       root.crosses = m % 2 == 0;
       root.factor = factor;
