@@ -108,10 +108,10 @@ Address parse_address(std::string_view text) {
     address.max = vector(rest.substr(comma + 1), text);
     if ((address.min.array() > address.max.array()).any()) throw expected("the smaller corner of the box first");
   } else {
-    throw InputError(fmt::format(
-        "address \"{}\": expected corner:U,V, edge:u0|u1|v0|v1, curve:LOOP,K[,FROM,TO], uv:U,V, cp:I,J or "
-        "box:[x,y,z],[x,y,z]",
-        text));
+    throw InputError(
+        fmt::format("address \"{}\": expected corner:U,V, edge:u0|u1|v0|v1, curve:LOOP,K[,FROM,TO], uv:U,V, cp:I,J or "
+                    "box:[x,y,z],[x,y,z]",
+                    text));
   }
   return address;
 }

@@ -17,7 +17,9 @@ namespace toile {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 std::string face_names(const PanelFile& file) {
   std::string names;
@@ -49,7 +51,9 @@ const TrimmedSurface& select_face(const PanelFile& file, const ScenePanel& panel
   return file.panels[static_cast<std::size_t>(panel.order)];
 }
 
-double box_size(const NurbsSurface& surface) { return bounding_box(surface).diagonal().norm(); }
+double box_size(const NurbsSurface& surface) {
+  return bounding_box(surface).diagonal().norm();
+}
 
 NurbsSurface placed(const NurbsSurface& surface, double metres_per_unit, const Placement& place) {
   Eigen::Matrix3Xd points = place.rotation() * (metres_per_unit * surface.points());
@@ -62,16 +66,17 @@ void refuse_kinks(const NurbsSurface& surface, const std::string& who) {
     const KnotVector& knots = surface.knots(d);
     const char axis = d == Direction::u ? 'u' : 'v';
     if (knots.degree() < 2) {
-      throw GeometryError(fmt::format("{}: degree {} in {} can't bend; give refine = {{ degree = 2 }}", who, knots.degree(),
-                                      axis));
+      throw GeometryError(
+          fmt::format("{}: degree {} in {} can't bend; give refine = {{ degree = 2 }}", who, knots.degree(), axis));
     }
     const std::vector<double> breaks = knots.breaks();
     for (std::size_t k = 1; k + 1 < breaks.size(); ++k) {
       if (knots.multiplicity(breaks[k]) >= knots.degree()) {
-        throw GeometryError(fmt::format(
-            "{}: the surface has a kink along the knot line {} = {} (multiplicity {} at degree {}), which the shell can't "
-            "bend across; smooth it or split the panel there",
-            who, axis, breaks[k], knots.multiplicity(breaks[k]), knots.degree()));
+        throw GeometryError(
+            fmt::format("{}: the surface has a kink along the knot line {} = {} (multiplicity {} at degree {}), which "
+                        "the shell can't "
+                        "bend across; smooth it or split the panel there",
+                        who, axis, breaks[k], knots.multiplicity(breaks[k]), knots.degree()));
       }
     }
   }
@@ -125,8 +130,8 @@ Eigen::VectorXd row_sums(const NurbsSurface& rest, const CutQuadrature& rule, do
 NurbsSurface start_surface(const PanelFile& file, const ScenePanel& panel, const NurbsSurface& rest) {
   const TrimmedSurface* face = by_name(file, *panel.start);
   if (!face) {
-    throw InputError(fmt::format("{}: start: no face of {} is called '{}'; it has {}", panel.where, file.path, *panel.start,
-                                 face_names(file)));
+    throw InputError(fmt::format("{}: start: no face of {} is called '{}'; it has {}", panel.where, file.path,
+                                 *panel.start, face_names(file)));
   }
   if (panel.degree || panel.span || panel.spans || panel.control_points) {
     throw InputError(panel.where + ": a panel with a start uses the file's own knots; leave refine out");
@@ -134,8 +139,8 @@ NurbsSurface start_surface(const PanelFile& file, const ScenePanel& panel, const
   NurbsSurface start = face->surface;
   if (!start.u().clamped() || !start.v().clamped()) start = clamp(start);
   if (start.u() != rest.u() || start.v() != rest.v() || start.weights() != rest.weights()) {
-    throw InputError(fmt::format("{}: start: '{}' has other degrees, knots or weights than '{}'", panel.where, *panel.start,
-                                 panel.name));
+    throw InputError(fmt::format("{}: start: '{}' has other degrees, knots or weights than '{}'", panel.where,
+                                 *panel.start, panel.name));
   }
   return start;
 }
@@ -178,8 +183,9 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
     parts.start = placed(start, unit, panel.place).points();
   }
   if (std::max(rest.u().degree(), rest.v().degree()) > 2) {
-    warnings.push_back(who + ": at degree 3 and above the strain is limited at knot-mesh points only, fewer than there are "
-                             "control points");
+    warnings.push_back(who +
+                       ": at degree 3 and above the strain is limited at knot-mesh points only, fewer than there are "
+                       "control points");
   }
   parts.shell = {panel.name, std::move(extension.rest), std::move(rule), panel.fabric, panel.grain};
   return parts;

@@ -39,9 +39,9 @@ struct Build {
   std::vector<PanelFile> files;
   std::vector<BuiltPanel> panels;
   std::unique_ptr<ShellModel> model;
-  AffineMap::Matrix dependence;      // of all control points
-  Eigen::VectorXd start;             // 3 n [m]
-  Eigen::VectorXd mass_floor;        // n [kg]: 0.01 of density times cell area (design.md, "Small cut cells")
+  AffineMap::Matrix dependence;  // of all control points
+  Eigen::VectorXd start;         // 3 n [m]
+  Eigen::VectorXd mass_floor;    // n [kg]: 0.01 of density times cell area (design.md, "Small cut cells")
   Loads loads;
   std::vector<std::string> warnings;
   double read_seconds = 0, trim_seconds = 0;

@@ -149,10 +149,11 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
                                         {"differences", r.differences}};
     fmt::print("{}\n", out.dump(2));
   } else {
-    fmt::print("{}: {} of {} faces, {} of {} entities kept; knots {}, weights {}, control points {}, parameter curves {}\n",
-               input, r.faces - r.faces_lost, r.faces, r.entities - r.entities_lost, r.entities,
-               r.knots_equal ? "equal" : "DIFFER", r.weights_equal ? "equal" : "DIFFER",
-               r.points_equal ? "equal" : "DIFFER", r.parameter_curves_equal ? "equal" : "DIFFER");
+    fmt::print(
+        "{}: {} of {} faces, {} of {} entities kept; knots {}, weights {}, control points {}, parameter curves {}\n",
+        input, r.faces - r.faces_lost, r.faces, r.entities - r.entities_lost, r.entities,
+        r.knots_equal ? "equal" : "DIFFER", r.weights_equal ? "equal" : "DIFFER", r.points_equal ? "equal" : "DIFFER",
+        r.parameter_curves_equal ? "equal" : "DIFFER");
     for (const std::string& difference : r.differences) fmt::print("  {}\n", difference);
   }
   return r.exact() ? exit_ok : exit_check;
@@ -167,7 +168,8 @@ int run_init(const std::string& name, const std::string& directory, const Common
   if (std::ranges::find(templates, name, &SceneTemplate::name) == templates.end()) {
     throw UsageError(fmt::format("no template is called '{}'; `toile init` lists them", name));
   }
-  const std::filesystem::path folder = directory.empty() ? std::filesystem::path(name) : std::filesystem::path(directory);
+  const std::filesystem::path folder =
+      directory.empty() ? std::filesystem::path(name) : std::filesystem::path(directory);
   const std::vector<TemplateFile> files = scene_template(name);
   for (const TemplateFile& file : files) {
     if (!common.overwrite && std::filesystem::exists(folder / file.name)) {
@@ -184,16 +186,18 @@ int run_presets(const Common& common) {
   for (const FabricPreset& p : fabric_presets()) {
     const Fabric& f = p.fabric;
     if (common.json) {
-      out.push_back({{"name", p.name},
-                     {"about", p.about},
-                     {"density", f.density},
-                     {"thickness", f.thickness},
-                     {"membrane", {{"weft", f.membrane.weft}, {"warp", f.membrane.warp}, {"shear", f.membrane.shear}}},
-                     {"bending", {{"b0", f.bending.b0}, {"kappa0", f.bending.kappa0}, {"kappa_reg", f.bending.kappa_reg}}},
-                     {"drag", f.drag},
-                     {"friction", f.friction}});
+      out.push_back(
+          {{"name", p.name},
+           {"about", p.about},
+           {"density", f.density},
+           {"thickness", f.thickness},
+           {"membrane", {{"weft", f.membrane.weft}, {"warp", f.membrane.warp}, {"shear", f.membrane.shear}}},
+           {"bending", {{"b0", f.bending.b0}, {"kappa0", f.bending.kappa0}, {"kappa_reg", f.bending.kappa_reg}}},
+           {"drag", f.drag},
+           {"friction", f.friction}});
     } else {
-      fmt::print("{:10} {}: {:.4g} kg/m2, {:.4g} N/m, B0 {:.2g} N m\n", p.name, p.about, f.density, f.membrane.weft, f.bending.b0);
+      fmt::print("{:10} {}: {:.4g} kg/m2, {:.4g} N/m, B0 {:.2g} N m\n", p.name, p.about, f.density, f.membrane.weft,
+                 f.bending.b0);
     }
   }
   if (common.json) fmt::print("{}\n", out.dump(2));
@@ -211,7 +215,8 @@ int run_program(int argc, char** argv) {
   DrapeArguments drape_arguments;
   CLI::App* drape_command = app.add_subcommand("drape", "Drape a scene, or a panel file held by --pin");
   drape_command->add_option("SCENE", drape_arguments.input, "scene.toml or panel.igs")->required();
-  drape_command->add_option("-o,--output", drape_arguments.directory, "Directory of the results (default: out/<scene name>)");
+  drape_command->add_option("-o,--output", drape_arguments.directory,
+                            "Directory of the results (default: out/<scene name>)");
   drape_command->add_option("--set", drape_arguments.settings, "key.path=value, any TOML value (panel.0.grain_deg=45)")
       ->take_all()
       ->allow_extra_args(false);
@@ -225,12 +230,15 @@ int run_program(int argc, char** argv) {
   drape_command->add_option("--fabric", drape_arguments.fabric, "Panel files: a preset");
 
   InspectArguments inspect_arguments;
-  CLI::App* inspect_command = app.add_subcommand("inspect", "Entities, loops, cells and constraint points of a panel file");
+  CLI::App* inspect_command =
+      app.add_subcommand("inspect", "Entities, loops, cells and constraint points of a panel file");
   inspect_command->add_option("FILE", inspect_arguments.input)->required();
   inspect_command->add_option("--svg", inspect_arguments.svg, "Draw the panels");
   inspect_command->add_option("--degree", inspect_arguments.degree, "Degree")->check(CLI::Range(1, 5));
   auto* span = inspect_command->add_option("--span", inspect_arguments.span, "Longest knot span (\"20 mm\")");
-  inspect_command->add_option("--spans", inspect_arguments.spans, "Spans per direction")->check(CLI::Range(1, 10000))->excludes(span);
+  inspect_command->add_option("--spans", inspect_arguments.spans, "Spans per direction")
+      ->check(CLI::Range(1, 10000))
+      ->excludes(span);
 
   std::string roundtrip_input;
   bool rewrite = false;
@@ -250,7 +258,8 @@ int run_program(int argc, char** argv) {
 
   CLI::App* presets_command = app.add_subcommand("presets", "Fabrics that need no table in the scene");
 
-  for (CLI::App* command : {drape_command, inspect_command, roundtrip_command, check_command, init_command, presets_command}) {
+  for (CLI::App* command :
+       {drape_command, inspect_command, roundtrip_command, check_command, init_command, presets_command}) {
     add_common(*command, common);
   }
 
@@ -270,7 +279,8 @@ int run_program(int argc, char** argv) {
     if (*inspect_command) return run_inspect(inspect_arguments, common, console);
     if (*roundtrip_command) return run_roundtrip(roundtrip_input, rewrite, common);
     if (*check_command) {
-      if (std::filesystem::path(check_arguments.input).extension() != ".toml") throw UsageError("check takes a scene.toml");
+      if (std::filesystem::path(check_arguments.input).extension() != ".toml")
+        throw UsageError("check takes a scene.toml");
       return check_scene(scene_of(check_arguments), common.json, console);
     }
     if (*init_command) return run_init(template_name, template_directory, common, console);

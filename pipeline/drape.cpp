@@ -22,10 +22,14 @@ namespace toile {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 volatile std::sig_atomic_t interrupted = 0;
-void on_interrupt(int) { interrupted = 1; }
+void on_interrupt(int) {
+  interrupted = 1;
+}
 
 // SIGINT asks the run to finish while this lives.
 class InterruptGuard {
@@ -42,10 +46,14 @@ class InterruptGuard {
 
 int exit_code(RunExit exit) {
   switch (exit) {
-    case RunExit::ok: return exit_ok;
-    case RunExit::solver_failed: return exit_solver;
-    case RunExit::check_failed: return exit_check;
-    case RunExit::interrupted: return exit_interrupted;
+    case RunExit::ok:
+      return exit_ok;
+    case RunExit::solver_failed:
+      return exit_solver;
+    case RunExit::check_failed:
+      return exit_check;
+    case RunExit::interrupted:
+      return exit_interrupted;
   }
   return exit_internal;
 }
@@ -54,10 +62,11 @@ std::string describe(const Build& build, std::size_t k) {
   const BuiltPanel& panel = build.panels[k];
   const NurbsSurface& s = panel.face.surface;
   const auto cells = [&](CellKind kind) { return std::ranges::count(panel.topology.cells, kind); };
-  return fmt::format("panel '{}': degree {} x {}, {} x {} control points, {} whole and {} cut cells, {} constraint points, "
-                     "{} control points extended",
-                     panel.name, s.u().degree(), s.v().degree(), s.count_u(), s.count_v(), cells(CellKind::inside),
-                     cells(CellKind::cut), panel.points.size(), panel.extended.size());
+  return fmt::format(
+      "panel '{}': degree {} x {}, {} x {} control points, {} whole and {} cut cells, {} constraint points, "
+      "{} control points extended",
+      panel.name, s.u().degree(), s.v().degree(), s.count_u(), s.count_v(), cells(CellKind::inside),
+      cells(CellKind::cut), panel.points.size(), panel.extended.size());
 }
 
 // Reasons of constraint points that the projection leaves out, with their number.
@@ -97,12 +106,14 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   hooks.stop = [] { return interrupted != 0; };
   hooks.frame = [&](const RunFrame& frame) {
     writer.write(frame);
-    log << fmt::format("frame {:4}  t = {:.6f} s  {:.2f} s of wall time\n", frame.number, frame.time, since(start)) << std::flush;
+    log << fmt::format("frame {:4}  t = {:.6f} s  {:.2f} s of wall time\n", frame.number, frame.time, since(start))
+        << std::flush;
   };
   hooks.progress = [&](const RunProgress& p) {
     const double wall = since(start);
-    console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {:.0f} s left", 100 * p.time / p.until, p.time,
-                             p.until, p.steps, p.dt, p.time > 0 ? wall * (p.until - p.time) / p.time : 0.0));
+    console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {:.0f} s left",
+                             100 * p.time / p.until, p.time, p.until, p.steps, p.dt,
+                             p.time > 0 ? wall * (p.until - p.time) / p.time : 0.0));
   };
   RunResult result = run(built, hooks);
   console.end_live();
@@ -121,23 +132,25 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
     }
   }
   if (result.unconverged_steps > 0) {
-    result.warnings.push_back(fmt::format("{} of {} steps did not meet the strain limit or the pins within {} iterations",
-                                          result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
+    result.warnings.push_back(
+        fmt::format("{} of {} steps did not meet the strain limit or the pins within {} iterations",
+                    result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
     console.warning(result.warnings.back());
   }
   const StateMeasures measures = measure(built, *result.system, result.state, result.dt_last);
   const std::string report = report_json(built, result, measures, since(writing)).dump(2) + "\n";
   write_file(directory / "report.json", report);
-  log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit), result.steps,
-                     result.redone_steps, result.dt_min, result.dt_max, result.wall_seconds);
+  log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit),
+                     result.steps, result.redone_steps, result.dt_min, result.dt_max, result.wall_seconds);
   if (!result.reason.empty()) log << result.reason << "\n";
 
   console.note(fmt::format("{}: {:.3g} s in {} frames, {} steps of {:.2g} to {:.2g} s, {:.2f} s of wall time",
                            built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,
                            result.wall_seconds));
-  console.note(fmt::format("  strain at most {:.2g} weft, {:.2g} warp; mean {:.2g}, {:.2g}; at constraint points {:.2g}",
-                           measures.strain.max[0], measures.strain.max[1], measures.strain.mean_abs[0],
-                           measures.strain.mean_abs[1], measures.at_constraints_max));
+  console.note(
+      fmt::format("  strain at most {:.2g} weft, {:.2g} warp; mean {:.2g}, {:.2g}; at constraint points {:.2g}",
+                  measures.strain.max[0], measures.strain.max[1], measures.strain.mean_abs[0],
+                  measures.strain.mean_abs[1], measures.at_constraints_max));
   console.note(fmt::format("  wrote {}", directory.string()));
   if (options.json) std::fputs(report.c_str(), stdout);
   if (result.exit == RunExit::ok) return exit_ok;
@@ -163,7 +176,8 @@ int dry_run(Scene scene, bool json, Console& console) {
   for (int k = 0; k < trial; ++k) step(system->dynamic, state, dt);
   const double seconds = trial > 0 ? since(start) / trial * static_cast<double>(steps) : 0;
   const std::size_t factor = system->projection ? system->projection->factor_nonzeros() : 0;
-  const double bytes = static_cast<double>(built.model->table_bytes() + 8 * factor) + 8.0 * 30 * static_cast<double>(built.start.size());
+  const double bytes =
+      static_cast<double>(built.model->table_bytes() + 8 * factor) + 8.0 * 30 * static_cast<double>(built.start.size());
   const std::map<std::string, int> reasons = unused(*system);
   if (json) {
     nlohmann::ordered_json out;

@@ -15,8 +15,8 @@ struct DrapeOptions {
   bool json = false;  // the report on stdout
 };
 
-// Runs a scene and writes its files; a scene that can't be built leaves none. Returns the exit code. SIGINT ends the run
-// after the present step with all files whole.
+// Runs a scene and writes its files; a scene that can't be built leaves none. Returns the exit code. SIGINT ends the
+// run after the present step with all files whole.
 int drape(Scene scene, const DrapeOptions& options, Console& console);
 
 // Builds the scene and says what a run would be: step and the cell that limits it, steps, estimated time and memory,

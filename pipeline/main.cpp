@@ -1,3 +1,5 @@
 #include "pipeline/cli.h"
 
-int main(int argc, char** argv) { return toile::run_program(argc, argv); }
+int main(int argc, char** argv) {
+  return toile::run_program(argc, argv);
+}

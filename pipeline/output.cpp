@@ -46,7 +46,8 @@ OutputUnit output_unit(const Build& build) {
 }
 
 std::string base_name(const std::string& name) {
-  if (name.size() > flat_suffix.size() && name.ends_with(flat_suffix)) return name.substr(0, name.size() - flat_suffix.size());
+  if (name.size() > flat_suffix.size() && name.ends_with(flat_suffix))
+    return name.substr(0, name.size() - flat_suffix.size());
   return name;
 }
 
@@ -131,9 +132,15 @@ FrameWriter::FrameWriter(const Build& build, std::filesystem::path directory)
   for (const BuiltPanel& panel : build.panels) impl_->triangles.push_back(triangulate(panel.face, panel.topology));
   for (const FrameFormat format : build.scene.formats) {
     switch (format) {
-      case FrameFormat::vtu: impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name)); break;
-      case FrameFormat::obj: impl_->sinks.push_back(std::make_unique<ObjSink>(impl_->frames)); break;
-      case FrameFormat::iges: impl_->iges = true; break;
+      case FrameFormat::vtu:
+        impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name));
+        break;
+      case FrameFormat::obj:
+        impl_->sinks.push_back(std::make_unique<ObjSink>(impl_->frames));
+        break;
+      case FrameFormat::iges:
+        impl_->iges = true;
+        break;
     }
   }
 }
@@ -167,7 +174,8 @@ void prepare_directory(const std::filesystem::path& directory, bool overwrite) {
       throw OutputError(fmt::format("{} is not empty; give --overwrite to replace a former run, or another -o DIR",
                                     directory.string()));
     }
-    for (const char* name : {"draped.igs", "report.json", "report.html", "preview.png", "run.log", "checkpoint", "frames"}) {
+    for (const char* name :
+         {"draped.igs", "report.json", "report.html", "preview.png", "run.log", "checkpoint", "frames"}) {
       fs::remove_all(directory / name, error);
       if (error) throw OutputError(fmt::format("{}: {}", (directory / name).string(), error.message()));
     }

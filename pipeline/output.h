@@ -16,8 +16,8 @@
 namespace toile {
 
 // The file of a state: per panel the flat face (level 1, "NAME flat", as the source has it on the run's knots) and the
-// draped one (level 2, "NAME draped", scene axes), in the source's unit with the source's trims. Panels of several units
-// come in the first one's.
+// draped one (level 2, "NAME draped", scene axes), in the source's unit with the source's trims. Panels of several
+// units come in the first one's.
 //   (1) S_draped(u, v) times the unit is the state's place of that material point within rounding;
 //   (2) both faces have the same knots and weights, and contain the file's knots.
 IgesOutput draped_file(const Build& build, const Eigen::VectorXd& q);
@@ -40,8 +40,8 @@ class FrameWriter {
 nlohmann::ordered_json report_json(const Build& build, const RunResult& result, const StateMeasures& measures,
                                    double write_seconds);
 
-// Makes the directory, or empties a former run's files out of it where `overwrite` allows; nothing else in it is touched.
-// Throws OutputError where it holds anything and overwrite is false.
+// Makes the directory, or empties a former run's files out of it where `overwrite` allows; nothing else in it is
+// touched. Throws OutputError where it holds anything and overwrite is false.
 void prepare_directory(const std::filesystem::path& directory, bool overwrite);
 
 }  // namespace toile

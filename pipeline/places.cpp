@@ -36,7 +36,9 @@ CurveOnSurface::CurveOnSurface(const TrimmedSurface& face, const TrimTopology& t
   }
 }
 
-Eigen::Vector2d CurveOnSurface::uv(double t) const { return curve_(t); }
+Eigen::Vector2d CurveOnSurface::uv(double t) const {
+  return curve_(t);
+}
 
 double CurveOnSurface::speed(double t) const {
   const CurveJet<2> c = evaluate(curve_, t);
@@ -79,7 +81,9 @@ struct Edge {
   int end = 0;        // 0: min, 1: max
 };
 
-Interval domain_of(const NurbsSurface& s, int direction) { return (direction == 0 ? s.u() : s.v()).domain(); }
+Interval domain_of(const NurbsSurface& s, int direction) {
+  return (direction == 0 ? s.u() : s.v()).domain();
+}
 
 double line_of(const NurbsSurface& s, const Edge& edge) {
   const Interval d = domain_of(s, edge.direction);
@@ -122,8 +126,8 @@ CurvePosition find_curve(const Address& at, const PanelPlaces& panel, const std:
     for (std::size_t c = 0; c < loop.curves.size(); ++c) {
       if (loop.curves[c].index == at.b) return {static_cast<int>(l), static_cast<int>(c)};
     }
-    throw GeometryError(fmt::format("{}: loop {} of panel '{}' has curves 0 to {}", who, at.a, panel.name,
-                                    loop.curves.size() - 1));
+    throw GeometryError(
+        fmt::format("{}: loop {} of panel '{}' has curves 0 to {}", who, at.a, panel.name, loop.curves.size() - 1));
   }
   throw GeometryError(fmt::format("{}: panel '{}' has loops 0 to {}", who, panel.name, panel.face.loops.size() - 1));
 }
@@ -142,13 +146,16 @@ std::optional<Edge> whole_edge(const Curve2& curve, const NurbsSurface& surface)
   return std::nullopt;
 }
 
-Edge edge_of(const Address& at) { return {at.a, at.b}; }
+Edge edge_of(const Address& at) {
+  return {at.a, at.b};
+}
 
 void require_edge(const Edge& edge, const PanelPlaces& panel, const std::string& who) {
   if (trim_follows(panel.face, edge)) return;
-  throw GeometryError(fmt::format("{}: edge {}{} of panel '{}' is trimmed away, wholly or in part; address a trim curve "
-                                  "instead (curve:LOOP,K; `toile inspect FILE --svg` shows their numbers)",
-                                  who, edge.direction == 0 ? 'u' : 'v', edge.end, panel.name));
+  throw GeometryError(
+      fmt::format("{}: edge {}{} of panel '{}' is trimmed away, wholly or in part; address a trim curve "
+                  "instead (curve:LOOP,K; `toile inspect FILE --svg` shows their numbers)",
+                  who, edge.direction == 0 ? 'u' : 'v', edge.end, panel.name));
 }
 
 void add_edge(const Edge& edge, bool clamp, const NurbsSurface& surface, std::vector<int>& out) {
@@ -163,9 +170,10 @@ void add_edge(const Edge& edge, bool clamp, const NurbsSurface& surface, std::ve
 }
 
 [[noreturn]] void no_clamp(const std::string& who) {
-  throw InputError(fmt::format("{}: clamp = true works at corner:, edge:, cp: and at curves that cover a whole edge of the "
-                               "domain in this version",
-                               who));
+  throw InputError(
+      fmt::format("{}: clamp = true works at corner:, edge:, cp: and at curves that cover a whole edge of the "
+                  "domain in this version",
+                  who));
 }
 
 }  // namespace
@@ -192,9 +200,10 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
       const Eigen::Vector2d uv(at.a == 0 ? surface.u().domain().min : surface.u().domain().max,
                                at.b == 0 ? surface.v().domain().min : surface.v().domain().max);
       if (!contains(panel.face, panel.topology, uv)) {
-        throw GeometryError(fmt::format("{}: corner ({}, {}) of panel '{}' is trimmed away; address the material instead "
-                                        "(uv:U,V or curve:LOOP,K)",
-                                        who, at.a, at.b, panel.name));
+        throw GeometryError(
+            fmt::format("{}: corner ({}, {}) of panel '{}' is trimmed away; address the material instead "
+                        "(uv:U,V or curve:LOOP,K)",
+                        who, at.a, at.b, panel.name));
       }
       const int i = at.a == 0 ? 0 : n_u - 1, j = at.b == 0 ? 0 : n_v - 1;
       held.control_points.push_back(surface.index(i, j));
@@ -213,8 +222,8 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
     }
     case Address::Kind::curve: {
       const CurvePosition position = find_curve(at, panel, who);
-      const TrimCurve& trim = panel.face.loops[static_cast<std::size_t>(position.loop)]
-                                  .curves[static_cast<std::size_t>(position.curve)];
+      const TrimCurve& trim =
+          panel.face.loops[static_cast<std::size_t>(position.loop)].curves[static_cast<std::size_t>(position.curve)];
       const auto edge = whole_edge(trim.curve, surface);
       if (edge && at.from == 0 && at.to == 1) {
         add_edge(*edge, clamp, surface, held.control_points);
@@ -233,8 +242,8 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
     case Address::Kind::uv: {
       const Interval du = surface.u().domain(), dv = surface.v().domain();
       if (!du.contains(at.uv.x()) || !dv.contains(at.uv.y())) {
-        throw GeometryError(fmt::format("{}: ({}, {}) lies outside panel '{}', whose domain is [{}, {}] x [{}, {}]", who,
-                                        at.uv.x(), at.uv.y(), panel.name, du.min, du.max, dv.min, dv.max));
+        throw GeometryError(fmt::format("{}: ({}, {}) lies outside panel '{}', whose domain is [{}, {}] x [{}, {}]",
+                                        who, at.uv.x(), at.uv.y(), panel.name, du.min, du.max, dv.min, dv.max));
       }
       if (!in_material(panel.face, panel.topology, at.uv)) {
         throw GeometryError(
@@ -255,8 +264,8 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
     }
     case Address::Kind::control_point: {
       if (at.a >= n_u || at.b >= n_v) {
-        throw GeometryError(fmt::format("{}: the net of panel '{}' is {} x {}, indices start from 0", who, panel.name, n_u,
-                                        n_v));
+        throw GeometryError(
+            fmt::format("{}: the net of panel '{}' is {} x {}, indices start from 0", who, panel.name, n_u, n_v));
       }
       if (!panel.carries_cloth[static_cast<std::size_t>(surface.index(at.a, at.b))]) {
         throw GeometryError(
@@ -306,7 +315,8 @@ std::vector<LinePoint> line_points(const Address& along, const PanelPlaces& pane
     const CurveOnSurface path(panel.face, panel.topology, position.loop, position.curve, panel.rest);
     const std::vector<double> t = path.breaks(along.from, along.to);
     for (std::size_t k = 1; k < t.size(); ++k) {
-      integrate(t[k - 1], t[k], [&](double s) { return path.uv(s); }, [&](double s) { return path.speed(s); });
+      integrate(
+          t[k - 1], t[k], [&](double s) { return path.uv(s); }, [&](double s) { return path.speed(s); });
     }
     return points;
   }

@@ -22,7 +22,7 @@ class CurveOnSurface {
   double length() const { return sum_.back(); }
   double parameter(double fraction) const;  // of the curve at a fraction of the length
   Eigen::Vector2d uv(double t) const;
-  double speed(double t) const;             // |dx/dt|
+  double speed(double t) const;  // |dx/dt|
   // Ends of smooth pieces within [from, to] (fractions), both included, ascending.
   std::vector<double> breaks(double from, double to) const;
 
@@ -40,9 +40,9 @@ struct LinePoint {
 
 // What a pin holds: control points (exactly), or material points, of which rows are chosen by rank.
 struct HeldPlace {
-  std::vector<int> control_points;         // of the panel's net, ascending
-  std::vector<Eigen::Vector2d> points;     // parameters
-  bool every_point = true;                 // false: as many of `points` as are independent (a curve)
+  std::vector<int> control_points;      // of the panel's net, ascending
+  std::vector<Eigen::Vector2d> points;  // parameters
+  bool every_point = true;              // false: as many of `points` as are independent (a curve)
 };
 
 // A panel as addresses see it.
@@ -50,8 +50,8 @@ struct PanelPlaces {
   const std::string& name;
   const TrimmedSurface& face;
   const TrimTopology& topology;
-  const NurbsSurface& rest;         // SI
-  const Eigen::Matrix3Xd& start;    // net, SI, scene axes
+  const NurbsSurface& rest;       // SI
+  const Eigen::Matrix3Xd& start;  // net, SI, scene axes
   const std::vector<bool>& carries_cloth;
 };
 

@@ -20,7 +20,9 @@ Json stress(const Extremes& e) {
           {"min_warp", e.min[1]}, {"max_warp", e.max[1]}, {"mean_warp", e.mean[1]}};
 }
 
-Json measured(double value, const char* unit) { return {{"value", value}, {"unit", unit}}; }
+Json measured(double value, const char* unit) {
+  return {{"value", value}, {"unit", unit}};
+}
 
 }  // namespace
 
@@ -68,18 +70,21 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"at_constraints_max", m.at_constraints_max}};
   report["points"] = Json::array();
   for (std::size_t k = 0; k < m.points.size(); ++k) {
-    report["points"].push_back({{"panel", scene.points[k].panel}, {"uv", array(scene.points[k].uv)}, {"position", array(m.points[k])}});
+    report["points"].push_back(
+        {{"panel", scene.points[k].panel}, {"uv", array(scene.points[k].uv)}, {"position", array(m.points[k])}});
   }
   report["reactions"] = Json::array();
   for (std::size_t k = 0; k < m.reactions.size(); ++k) {
-    report["reactions"].push_back({{"pin", k}, {"panel", scene.pins[k].panel}, {"at", scene.pins[k].at.text}, {"force", array(m.reactions[k])}});
+    report["reactions"].push_back(
+        {{"pin", k}, {"panel", scene.pins[k].panel}, {"at", scene.pins[k].at.text}, {"force", array(m.reactions[k])}});
   }
   report["stress"] = stress(m.nominal);
   report["stress"]["second_pk"] = stress(m.second_pk);
-  report["stress"]["part"] = system.strain_rows > 0 ? "membrane only: what the strain limit carries is not in it" : "whole";
+  report["stress"]["part"] =
+      system.strain_rows > 0 ? "membrane only: what the strain limit carries is not in it" : "whole";
   const EnergyBalance& e = run.energy;
-  report["energy"] = {{"kinetic", e.kinetic},     {"membrane", e.membrane},       {"bending", e.bending},
-                      {"gravity", e.gravity},     {"dissipated", e.dissipated()}, {"loads_work", e.load_work},
+  report["energy"] = {{"kinetic", e.kinetic},         {"membrane", e.membrane},       {"bending", e.bending},
+                      {"gravity", e.gravity},         {"dissipated", e.dissipated()}, {"loads_work", e.load_work},
                       {"motion_work", e.motion_work}, {"injected", e.injected}};
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
                           {"iterations_max", run.iterations_max},

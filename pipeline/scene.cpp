@@ -56,13 +56,20 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& po
 
 const char* type_name(const toml::node& node) {
   switch (node.type()) {
-    case toml::node_type::table: return "a table";
-    case toml::node_type::array: return "an array";
-    case toml::node_type::string: return "a string";
-    case toml::node_type::integer: return "a whole number";
-    case toml::node_type::floating_point: return "a number";
-    case toml::node_type::boolean: return "true or false";
-    default: return "a date or time";
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "an array";
+    case toml::node_type::string:
+      return "a string";
+    case toml::node_type::integer:
+      return "a whole number";
+    case toml::node_type::floating_point:
+      return "a number";
+    case toml::node_type::boolean:
+      return "true or false";
+    default:
+      return "a date or time";
   }
 }
 
@@ -104,11 +111,13 @@ class Table {
         fail(node, fmt::format("{}: {}", what, error.what()));
       }
     } else {
-      fail(node, fmt::format("{} must be {} or a string with a unit, not {}", what, expected(dimension), type_name(node)));
+      fail(node,
+           fmt::format("{} must be {} or a string with a unit, not {}", what, expected(dimension), type_name(node)));
     }
     if (!std::isfinite(value)) fail(node, fmt::format("{} must be finite", what));
     if (range == Range::positive && !(value > 0)) fail(node, fmt::format("{} is {}, must be positive", what, value));
-    if (range == Range::nonnegative && value < 0) fail(node, fmt::format("{} is {}, must not be negative", what, value));
+    if (range == Range::nonnegative && value < 0)
+      fail(node, fmt::format("{} is {}, must not be negative", what, value));
     return value;
   }
   std::optional<double> number(const std::string& key, const Dimension& dimension, Range range, double bare_unit = 1) {
@@ -130,8 +139,8 @@ class Table {
     }
     Eigen::Matrix<double, N, 1> result;
     for (int i = 0; i < N; ++i) {
-      result[i] = quantity((*array)[static_cast<std::size_t>(i)], fmt::format("entry {} of {}", i, label(key)), dimension,
-                           Range::any, bare_unit);
+      result[i] = quantity((*array)[static_cast<std::size_t>(i)], fmt::format("entry {} of {}", i, label(key)),
+                           dimension, Range::any, bare_unit);
     }
     return result;
   }
@@ -143,7 +152,8 @@ class Table {
   int integer(const toml::node& node, const std::string& what, int least, int most) {
     const auto value = node.is_integer() ? node.value<std::int64_t>() : std::nullopt;
     if (!value) fail(node, fmt::format("{} must be a whole number, not {}", what, type_name(node)));
-    if (*value < least || *value > most) fail(node, fmt::format("{} is {}, must be {} to {}", what, *value, least, most));
+    if (*value < least || *value > most)
+      fail(node, fmt::format("{} is {}, must be {} to {}", what, *value, least, most));
     return static_cast<int>(*value);
   }
   std::optional<std::array<int, 2>> integers(const std::string& key, int least, int most) {
@@ -151,7 +161,8 @@ class Table {
     if (!node) return std::nullopt;
     const toml::array* array = node->as_array();
     if (!array || array->size() != 2) fail(*node, fmt::format("{} must be two whole numbers [u, v]", label(key)));
-    return std::array<int, 2>{integer((*array)[0], label(key), least, most), integer((*array)[1], label(key), least, most)};
+    return std::array<int, 2>{integer((*array)[0], label(key), least, most),
+                              integer((*array)[1], label(key), least, most)};
   }
   std::optional<std::string> string(const std::string& key) {
     const toml::node* node = find(key);
@@ -172,7 +183,8 @@ class Table {
     if (!value) return std::nullopt;
     const toml::node& node = *table_.get(key);
     if (std::ranges::find(later, *value) != later.end()) {
-      fail(node, fmt::format("{} = \"{}\" is not supported by this version; use {}", label(key), *value, fmt::join(now, " or ")));
+      fail(node, fmt::format("{} = \"{}\" is not supported by this version; use {}", label(key), *value,
+                             fmt::join(now, " or ")));
     }
     if (std::ranges::find(now, *value) == now.end()) {
       fail(node, fmt::format("unknown {} \"{}\"{}", label(key), *value, suggestion(*value, now)));
@@ -297,7 +309,8 @@ void assign(toml::table& root, const std::string& setting) {
       if (index == array->size()) array->push_back(toml::table{});
       node = array->get(index);
     } else {
-      throw InputError(fmt::format("--set {}: '{}' is {}, which holds no keys", setting, parts[k - 1], type_name(*node)));
+      throw InputError(
+          fmt::format("--set {}: '{}' is {}, which holds no keys", setting, parts[k - 1], type_name(*node)));
     }
   }
 }
@@ -382,7 +395,8 @@ ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fab
   panel.where = table.where();
   panel.name = table.string("name").value_or("");
   if (table.find("pattern")) {
-    table.fail(*table.raw().get("pattern"), "pattern files are not supported by this version; use file = \"panel.igs\"");
+    table.fail(*table.raw().get("pattern"),
+               "pattern files are not supported by this version; use file = \"panel.igs\"");
   }
   const auto file = table.string("file");
   if (!file) table.missing("file", "the IGES file that holds the panel, relative to the scene");
@@ -455,7 +469,8 @@ ScenePin read_pin(Table table, const std::vector<ScenePanel>& panels) {
     if (!end) move->missing("end", "the time at which the motion is complete");
     motion.end = *end;
     if (!(motion.start < motion.end)) {
-      move->fail(*move->raw().get("end"), fmt::format("end in move is {} s, must come after start = {} s", motion.end, motion.start));
+      move->fail(*move->raw().get("end"),
+                 fmt::format("end in move is {} s, must come after start = {} s", motion.end, motion.start));
     }
     move->done();
     pin.move = motion;
@@ -471,7 +486,8 @@ SceneTraction read_traction(Table table, const std::vector<ScenePanel>& panels) 
   traction.panel = panel_key(table, panels);
   traction.along = address(table, "along");
   if (traction.along.kind != Address::Kind::edge && traction.along.kind != Address::Kind::curve) {
-    table.fail(*table.raw().get("along"), fmt::format("along = \"{}\": expected edge:... or curve:...", traction.along.text));
+    table.fail(*table.raw().get("along"),
+               fmt::format("along = \"{}\": expected edge:... or curve:...", traction.along.text));
   }
   const auto force = table.vector<3>("force", dimension::force_per_length);
   if (!force) table.missing("force", "a vector in N/m");
@@ -563,6 +579,10 @@ void read_settings(Table& top, Scene& scene) {
   }
   if (auto table = top.table("solver", "[solver]")) read_solver(*table, scene);
   if (auto table = top.table("output", "[output]")) read_output(*table, scene);
+  if (scene.until / scene.every > 1e6) {
+    throw InputError(fmt::format("{}: until = {} s with a frame every {} s would be more than a million frames",
+                                 scene.path.string(), scene.until, scene.every));
+  }
 }
 
 Scene read_tables(toml::table& root, const std::filesystem::path& path, std::span<const std::string> settings) {
@@ -579,7 +599,8 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   Fabrics fabrics;
   if (auto table = top.table("fabric", "[fabric]")) {
     for (const auto& [name, node] : table->raw()) {
-      fabrics.named.emplace_back(name.str(), read_fabric(table->as_table(node, fmt::format("[fabric.{}]", name.str()))));
+      fabrics.named.emplace_back(name.str(),
+                                 read_fabric(table->as_table(node, fmt::format("[fabric.{}]", name.str()))));
     }
   }
   for (Table& table : top.tables("panel", "[[panel]]")) {

@@ -22,19 +22,19 @@ struct Placement {
 };
 
 struct ScenePanel {
-  std::string name;                  // a face of the file by its name, else by its order
-  bool named = true;                 // false: `name` was made up, the face is taken by its order
-  int order = 0;                     // of this panel among those of the scene that come from the same file
+  std::string name;   // a face of the file by its name, else by its order
+  bool named = true;  // false: `name` was made up, the face is taken by its order
+  int order = 0;      // of this panel among those of the scene that come from the same file
   std::filesystem::path file;
   std::optional<std::string> start;  // face of the same file and knots whose net is the initial place; else the rest
   std::optional<int> degree;
-  std::optional<double> span;        // m
+  std::optional<double> span;  // m
   std::optional<std::array<int, 2>> spans, control_points;
-  double grain = 0;                  // rad
-  Placement place;                   // of the rest and of the start
+  double grain = 0;  // rad
+  Placement place;   // of the rest and of the start
   Fabric fabric;
   std::string fabric_name;
-  std::string where;                 // "scene.toml:12", for messages
+  std::string where;  // "scene.toml:12", for messages
 };
 
 // Smooth motion of what a pin holds: the rigid motion (turn about centre, then translate) is scaled by a quintic that

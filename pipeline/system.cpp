@@ -47,7 +47,8 @@ struct Candidate {
 
 // Which candidates are independent of those before them and of the fixed control points: Cholesky of the rows' inertia
 // N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one left.
-std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map, const Eigen::VectorXd& mass) {
+std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
+                              const Eigen::VectorXd& mass) {
   const int n = static_cast<int>(candidates.size());
   Eigen::SparseMatrix<double, Eigen::RowMajor> rows(n, map.control_points());
   std::vector<Eigen::Triplet<double>> entries;
@@ -151,9 +152,10 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     places.push_back(build.start.segment<3>(3 * h.control_point));
     system->fixed_pin.push_back(h.pin);
   }
-  system->map = std::make_unique<AffineMap>(
-      build.dependence, control_points,
-      [moved, places, pins = system->fixed_pin](std::size_t i, double time) { return moved(pins[i], places[i], time); });
+  system->map = std::make_unique<AffineMap>(build.dependence, control_points,
+                                            [moved, places, pins = system->fixed_pin](std::size_t i, double time) {
+                                              return moved(pins[i], places[i], time);
+                                            });
 
   DynamicSystem& dynamic = system->dynamic;
   dynamic.model = build.model.get();

@@ -15,12 +15,12 @@ struct System {
   System() = default;
   System(const System&) = delete;
 
-  std::vector<int> fixed_pin;                             // pin of each fixed control point, in map order
-  std::vector<std::vector<ConstraintPoint>> points;       // per panel: which the projection takes, and why not
+  std::vector<int> fixed_pin;                        // pin of each fixed control point, in map order
+  std::vector<std::vector<ConstraintPoint>> points;  // per panel: which the projection takes, and why not
   int strain_rows = 0, place_rows = 0;
-  std::vector<int> place_pin;                             // pin of each place row
+  std::vector<int> place_pin;  // pin of each place row
   std::unique_ptr<AffineMap> map;
-  std::unique_ptr<FastProjection> projection;             // null: nothing to project
+  std::unique_ptr<FastProjection> projection;  // null: nothing to project
   DynamicSystem dynamic;
 };
 

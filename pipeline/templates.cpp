@@ -32,11 +32,14 @@ std::string panel_file(TrimmedSurface face) {
 std::string scene_text(const std::string& about, const std::string& panel, const std::string& pins) {
   return "# " + about + R"(
 # toile drape scene.toml          lengths in metres, or with units: "20 mm", "120 g/m2", "30 deg"
-# toile inspect )" + panel + R"(.igs --svg panel.svg     shows the loop and curve numbers that addresses use
+# toile inspect )" +
+         panel + R"(.igs --svg panel.svg     shows the loop and curve numbers that addresses use
 
 [[panel]]
-name = ")" + panel + R"("
-file = ")" + panel + R"(.igs"
+name = ")" +
+         panel + R"("
+file = ")" +
+         panel + R"(.igs"
 refine = { degree = 2, span = "40 mm" }
 grain_deg = 0                                 # weft against the u direction
 fabric = "cotton"
@@ -52,7 +55,8 @@ drag = 0.25                                              # kg/(m2 s)
 mode = "inextensible"                         # or "off"
 tolerance = 0.01
 
-)" + pins + R"(
+)" + pins +
+         R"(
 [load]
 gravity = [0, 0, -9.81]
 

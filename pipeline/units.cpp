@@ -22,38 +22,22 @@ struct Unit {
 constexpr double gravity = 9.80665;  // m/s2, standard
 
 constexpr std::array units = {
-    Unit{"m", 1, {1, 0, 0, 0}},
-    Unit{"km", 1e3, {1, 0, 0, 0}},
-    Unit{"dm", 0.1, {1, 0, 0, 0}},
-    Unit{"cm", 0.01, {1, 0, 0, 0}},
-    Unit{"mm", 1e-3, {1, 0, 0, 0}},
-    Unit{"um", 1e-6, {1, 0, 0, 0}},
-    Unit{"in", 0.0254, {1, 0, 0, 0}},
-    Unit{"inch", 0.0254, {1, 0, 0, 0}},
-    Unit{"ft", 0.3048, {1, 0, 0, 0}},
-    Unit{"yd", 0.9144, {1, 0, 0, 0}},
-    Unit{"kg", 1, {0, 1, 0, 0}},
-    Unit{"g", 1e-3, {0, 1, 0, 0}},
-    Unit{"mg", 1e-6, {0, 1, 0, 0}},
-    Unit{"oz", 0.028349523125, {0, 1, 0, 0}},
-    Unit{"gsm", 1e-3, {-2, 1, 0, 0}},
-    Unit{"s", 1, {0, 0, 1, 0}},
-    Unit{"ms", 1e-3, {0, 0, 1, 0}},
-    Unit{"us", 1e-6, {0, 0, 1, 0}},
-    Unit{"min", 60, {0, 0, 1, 0}},
-    Unit{"h", 3600, {0, 0, 1, 0}},
-    Unit{"N", 1, {1, 1, -2, 0}},
-    Unit{"kN", 1e3, {1, 1, -2, 0}},
-    Unit{"cN", 1e-2, {1, 1, -2, 0}},
-    Unit{"mN", 1e-3, {1, 1, -2, 0}},
-    Unit{"uN", 1e-6, {1, 1, -2, 0}},
-    Unit{"gf", 1e-3 * gravity, {1, 1, -2, 0}},
-    Unit{"J", 1, {2, 1, -2, 0}},
-    Unit{"Pa", 1, {-1, 1, -2, 0}},
-    Unit{"kPa", 1e3, {-1, 1, -2, 0}},
-    Unit{"MPa", 1e6, {-1, 1, -2, 0}},
-    Unit{"rad", 1, {0, 0, 0, 1}},
-    Unit{"deg", std::numbers::pi / 180, {0, 0, 0, 1}},
+    Unit{"m", 1, {1, 0, 0, 0}},       Unit{"km", 1e3, {1, 0, 0, 0}},
+    Unit{"dm", 0.1, {1, 0, 0, 0}},    Unit{"cm", 0.01, {1, 0, 0, 0}},
+    Unit{"mm", 1e-3, {1, 0, 0, 0}},   Unit{"um", 1e-6, {1, 0, 0, 0}},
+    Unit{"in", 0.0254, {1, 0, 0, 0}}, Unit{"inch", 0.0254, {1, 0, 0, 0}},
+    Unit{"ft", 0.3048, {1, 0, 0, 0}}, Unit{"yd", 0.9144, {1, 0, 0, 0}},
+    Unit{"kg", 1, {0, 1, 0, 0}},      Unit{"g", 1e-3, {0, 1, 0, 0}},
+    Unit{"mg", 1e-6, {0, 1, 0, 0}},   Unit{"oz", 0.028349523125, {0, 1, 0, 0}},
+    Unit{"gsm", 1e-3, {-2, 1, 0, 0}}, Unit{"s", 1, {0, 0, 1, 0}},
+    Unit{"ms", 1e-3, {0, 0, 1, 0}},   Unit{"us", 1e-6, {0, 0, 1, 0}},
+    Unit{"min", 60, {0, 0, 1, 0}},    Unit{"h", 3600, {0, 0, 1, 0}},
+    Unit{"N", 1, {1, 1, -2, 0}},      Unit{"kN", 1e3, {1, 1, -2, 0}},
+    Unit{"cN", 1e-2, {1, 1, -2, 0}},  Unit{"mN", 1e-3, {1, 1, -2, 0}},
+    Unit{"uN", 1e-6, {1, 1, -2, 0}},  Unit{"gf", 1e-3 * gravity, {1, 1, -2, 0}},
+    Unit{"J", 1, {2, 1, -2, 0}},      Unit{"Pa", 1, {-1, 1, -2, 0}},
+    Unit{"kPa", 1e3, {-1, 1, -2, 0}}, Unit{"MPa", 1e6, {-1, 1, -2, 0}},
+    Unit{"rad", 1, {0, 0, 0, 1}},     Unit{"deg", std::numbers::pi / 180, {0, 0, 0, 1}},
     Unit{"%", 0.01, {0, 0, 0, 0}},
 };
 
@@ -206,7 +190,8 @@ double parse_quantity(std::string_view text, const Dimension& expected) {
     // A bare number is SI.
     const bool bare = value.dimension == dimension::none && text.find('%') == std::string_view::npos;
     if (!bare) {
-      throw InputError(fmt::format("\"{}\" is in {}, expected {}", text, unit_name(value.dimension), unit_name(expected)));
+      throw InputError(
+          fmt::format("\"{}\" is in {}, expected {}", text, unit_name(value.dimension), unit_name(expected)));
     }
   }
   return value.factor;

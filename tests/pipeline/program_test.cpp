@@ -22,9 +22,11 @@ struct Outcome {
 };
 
 Outcome toile(const Folder& folder, const std::string& arguments) {
-  const std::string command = "cd '" + folder.path().string() + "' && '" TOILE_PROGRAM "' " + arguments + " >stdout.txt 2>stderr.txt";
+  const std::string command =
+      "cd '" + folder.path().string() + "' && '" TOILE_PROGRAM "' " + arguments + " >stdout.txt 2>stderr.txt";
   const int status = std::system(command.c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(folder / "stdout.txt"), read_file(folder / "stderr.txt")};
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(folder / "stdout.txt"),
+          read_file(folder / "stderr.txt")};
 }
 
 // A folder with a panel and a scene that runs in a moment.
@@ -37,7 +39,8 @@ struct Small : Folder {
 
 TEST(Program, DrapesAndReports) {
   const Small folder("drape");
-  const Outcome run = toile(folder, "drape scene.toml -o result --json --set 'output.formats=[\"vtu\", \"iges\"]' --set output.preview=true");
+  const Outcome run = toile(
+      folder, "drape scene.toml -o result --json --set 'output.formats=[\"vtu\", \"iges\"]' --set output.preview=true");
   ASSERT_EQ(run.code, 0) << run.err;
   for (const char* name : {"draped.igs", "report.json", "run.log", "frames/frame_0002.igs"}) {
     EXPECT_TRUE(std::filesystem::exists(folder / "result" / name)) << name;
@@ -128,7 +131,8 @@ TEST(Program, AUsedDirectoryIsKeptUnlessOverwritten) {
 
 TEST(Program, AnUnmetLimitIsExit6) {
   const Small folder("limit");
-  const Outcome run = toile(folder, "drape scene.toml -o result --set strain_limit.tolerance=1e-15 --set strain_limit.max_iterations=1");
+  const Outcome run = toile(
+      folder, "drape scene.toml -o result --set strain_limit.tolerance=1e-15 --set strain_limit.max_iterations=1");
   EXPECT_EQ(run.code, 6) << run.err;
   EXPECT_NE(run.err.find("strain limit is not met"), std::string::npos) << run.err;
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "check");

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <Eigen/SVD>
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <random>
 #include <string>
@@ -40,7 +40,8 @@ std::string geometry_refusal(const TrimmedSurface& face, const std::string& pins
 
 TEST(Places, TrimmedAwayPlacesAreNamed) {
   const TrimmedSurface face = test::trimmed_sheet("cloth");
-  for (const char* at : {"corner:0,0", "edge:u0", "edge:v1", "uv:10,10", "uv:900,10", "curve:0,7", "curve:1,0", "cp:40,0"}) {
+  for (const char* at :
+       {"corner:0,0", "edge:u0", "edge:v1", "uv:10,10", "uv:900,10", "curve:0,7", "curve:1,0", "cp:40,0"}) {
     const std::string message = geometry_refusal(face, std::string("[[pin]]\nat = \"") + at + "\"\n");
     EXPECT_NE(message.find(std::string("pin 0 (") + at + ")"), std::string::npos) << at << ": " << message;
     EXPECT_NE(message.find("'cloth'"), std::string::npos) << at << ": " << message;
@@ -99,14 +100,15 @@ TEST(Places, CurvePinRowsAreIndependent) {
     dense.row(static_cast<Eigen::Index>(r)).array() /= system->dynamic.node_mass.transpose().array().sqrt();
     dense.row(static_cast<Eigen::Index>(r)).normalize();
   }
-  const Eigen::VectorXd singular = dense.bdcSvd().singularValues();
-  EXPECT_GT(singular.minCoeff(), 1e-4 * singular.maxCoeff());
+  const Eigen::MatrixXd gram = dense * dense.transpose();
+  const Eigen::LLT<Eigen::MatrixXd> factor(gram);
+  ASSERT_EQ(factor.info(), Eigen::Success);
+  EXPECT_GT(factor.rcond(), 1e-7);
 }
 
 TEST(Run, StepsLandOnFrames) {
   const Folder folder("frames");
-  const Build b = built(folder, test::sheet("cloth"),
-                        test::scene_text(corner_pins, "") + "[load]\nwind = [0, 0, 1]\n");
+  const Build b = built(folder, test::sheet("cloth"), test::scene_text(corner_pins, "") + "[load]\nwind = [0, 0, 1]\n");
   std::vector<double> times;
   RunHooks hooks;
   hooks.frame = [&](const RunFrame& frame) { times.push_back(frame.time); };
@@ -129,8 +131,7 @@ TEST(Run, TheSameSceneGivesTheSameBytes) {
 
 TEST(Run, DrapedFileIsTheLastState) {
   const Folder folder("draped");
-  const Build b = built(folder, test::trimmed_sheet("cloth"),
-                        test::scene_text("[[pin]]\nat = \"curve:0,2\"\n") );
+  const Build b = built(folder, test::trimmed_sheet("cloth"), test::scene_text("[[pin]]\nat = \"curve:0,2\"\n"));
   const RunResult result = run(b);
   const Eigen::VectorXd q = control_points(*result.system, result.state);
   const PanelFile file = parse_iges(draped_file(b, q).text, "draped.igs");
@@ -230,12 +231,15 @@ TEST(Run, AStepAboveTheBoundIsHalvedAndTheRunGoesOn) {
   text.replace(text.find("tolerance = 0.01"), 16, "mode = \"off\"");
   const Build automatic = built(folder, test::sheet("cloth"), text);
   const RunResult fine = run(automatic);
-  text.replace(text.find("until = 0.1"), 11, "until = 0.1\ndt = " + std::to_string(4 * fine.dt_max));
+  // Far above the membrane's bound; a step little above the bending's only chatters.
+  const double dt = 16 * fine.dt_max;
+  text.replace(text.find("until = 0.1"), 11, "until = 0.5\ndt = " + std::to_string(dt));
+  text.replace(text.find("every = 0.05"), 12, "every = 0.5");
   const Build b = built(folder, test::sheet("cloth"), text);
   const RunResult result = run(b);
   EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
   EXPECT_GT(result.redone_steps, 0);
-  EXPECT_LT(result.dt_min, 2 * fine.dt_max);
+  EXPECT_LE(result.dt_min, dt / 2);
 }
 
 TEST(Run, StoppingLeavesAWholeResult) {

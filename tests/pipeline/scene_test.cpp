@@ -64,7 +64,8 @@ std::string refusal(std::size_t line, const std::string& replacement) {
 void expect_message(std::size_t line, const std::string& replacement, const std::vector<std::string>& parts) {
   const std::string message = refusal(line, replacement);
   EXPECT_TRUE(message.starts_with(std::to_string(line) + ":")) << message;
-  for (const std::string& part : parts) EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks " << part;
+  for (const std::string& part : parts)
+    EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks " << part;
 }
 
 TEST(Scene, ComesOutInSi) {
@@ -135,12 +136,14 @@ TEST(Scene, LaterFeaturesAreRefusedByName) {
   expect_message(3, "pattern = \"a.json\"", {"pattern files are not supported by this version"});
 }
 
-TEST(Scene, BrokenTomlNamesItsLine) { expect_message(8, "density = = 3", {}); }
+TEST(Scene, BrokenTomlNamesItsLine) {
+  expect_message(8, "density = = 3", {});
+}
 
 TEST(Scene, SettingsOverrideAndAdd) {
-  const Scene scene =
-      parse(valid_lines(), {"panel.0.grain_deg=45", "strain_limit.mode=off", "fabric.linen.density=200 g/m2",
-                            "load.gravity=[0, 0, -1.62]", "pin.1.at=corner:1,0", "panel[0].refine={control_points=[5,6]}"});
+  const Scene scene = parse(
+      valid_lines(), {"panel.0.grain_deg=45", "strain_limit.mode=off", "fabric.linen.density=200 g/m2",
+                      "load.gravity=[0, 0, -1.62]", "pin.1.at=corner:1,0", "panel[0].refine={control_points=[5,6]}"});
   expect_near_rel(scene.panels[0].grain, std::numbers::pi / 4, 1e-15);
   EXPECT_FALSE(scene.strain_limit.on);
   expect_near_rel(scene.panels[0].fabric.density, 0.2, 1e-15);
@@ -189,9 +192,27 @@ TEST(Address, FormsAreRead) {
 }
 
 TEST(Address, OthersAreRefused) {
-  for (const char* text : {"", "corner", "corner:0", "corner:0,2", "corner:0,0,0", "edge:w0", "edge:u2", "curve:0",
-                           "curve:0,-1", "curve:0,1,0.5", "curve:0,1,0.5,0.5", "curve:0,1,-0.1,0.5", "curve:0,1.5", "uv:1",
-                           "uv:nan,0", "cp:1", "cp:-1,0", "box:[0,0,0]", "box:[0,0,0],[1,1]", "box:[1,0,0],[0,1,1]", "corners:0,0"}) {
+  for (const char* text : {"",
+                           "corner",
+                           "corner:0",
+                           "corner:0,2",
+                           "corner:0,0,0",
+                           "edge:w0",
+                           "edge:u2",
+                           "curve:0",
+                           "curve:0,-1",
+                           "curve:0,1,0.5",
+                           "curve:0,1,0.5,0.5",
+                           "curve:0,1,-0.1,0.5",
+                           "curve:0,1.5",
+                           "uv:1",
+                           "uv:nan,0",
+                           "cp:1",
+                           "cp:-1,0",
+                           "box:[0,0,0]",
+                           "box:[0,0,0],[1,1]",
+                           "box:[1,0,0],[0,1,1]",
+                           "corners:0,0"}) {
     EXPECT_THROW(parse_address(text), InputError) << text;
   }
 }

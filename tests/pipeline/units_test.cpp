@@ -34,9 +34,13 @@ TEST(Units, ConvertToSi) {
   expect_near_rel(parse_quantity("1 %", dimension::none), 0.01, 1e-15);
 }
 
-TEST(Units, AFractionIsANumber) { EXPECT_EQ(parse_quantity("1/30 s", dimension::time), 1.0 / 30); }
+TEST(Units, AFractionIsANumber) {
+  EXPECT_EQ(parse_quantity("1/30 s", dimension::time), 1.0 / 30);
+}
 
-TEST(Units, ABareNumberIsSi) { EXPECT_EQ(parse_quantity("0.25", dimension::length), 0.25); }
+TEST(Units, ABareNumberIsSi) {
+  EXPECT_EQ(parse_quantity("0.25", dimension::length), 0.25);
+}
 
 TEST(Units, AnotherDimensionIsRefused) {
   EXPECT_NE(refusal("20 kg", dimension::length).find("is in kg, expected m"), std::string::npos);
@@ -49,7 +53,8 @@ TEST(Units, TwoReadingsAreRefused) {
 }
 
 TEST(Units, NonsenseIsRefused) {
-  for (const char* text : {"", "mm", "2 parsec", "2 m)", "2 (m", "1/0 s", "nan m", "inf m", "2 m^", "1e999 m", "2 m/", "--2 m"}) {
+  for (const char* text :
+       {"", "mm", "2 parsec", "2 m)", "2 (m", "1/0 s", "nan m", "inf m", "2 m^", "1e999 m", "2 m/", "--2 m"}) {
     EXPECT_NE(refusal(text, dimension::length), "accepted") << text;
   }
 }
