@@ -21,9 +21,9 @@ struct Box {
 
 // A part of a span in the direction of its loop.
 struct Piece {
-  int loop = 0, link = 0;   // link: number of the span in the chain of its loop
-  double s0 = 0, s1 = 1;    // on that span, in the loop's direction
-  TrimSpan span;            // control points in the loop's direction
+  int loop = 0, link = 0;  // link: number of the span in the chain of its loop
+  double s0 = 0, s1 = 1;   // on that span, in the loop's direction
+  TrimSpan span;           // control points in the loop's direction
   Box box;
 
   int degree() const { return span.degree; }
@@ -78,7 +78,9 @@ bool forward(const Piece& piece) {
   return true;
 }
 
-double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+double cross(const Vector2d& a, const Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
 
 class Finder {
  public:
@@ -95,8 +97,9 @@ class Finder {
       const double size = max[axis] - min[axis];
       scale_[axis] = size > 0 ? std::ldexp(1.0, -std::ilogb(size)) : 1;
     }
-    margin_ = 8 * epsilon * std::max((scale_.asDiagonal() * min).cwiseAbs().maxCoeff(),
-                                     (scale_.asDiagonal() * max).cwiseAbs().maxCoeff());
+    margin_ =
+        8 * epsilon *
+        std::max((scale_.asDiagonal() * min).cwiseAbs().maxCoeff(), (scale_.asDiagonal() * max).cwiseAbs().maxCoeff());
     smallest_ = 8 * margin_;
     for (std::size_t l = 0; l < loops.size(); ++l) add_loop(loops[l], static_cast<int>(l), spans);
   }
@@ -211,7 +214,8 @@ class Finder {
 
   bool near_known_contact(const Piece& a, const Piece& b) const {
     const auto near = [this](const Piece& piece, const Vector2d& x) {
-      return (piece.box.min - x).cwiseAbs().maxCoeff() <= cluster_ && (piece.box.max - x).cwiseAbs().maxCoeff() <= cluster_;
+      return (piece.box.min - x).cwiseAbs().maxCoeff() <= cluster_ &&
+             (piece.box.max - x).cwiseAbs().maxCoeff() <= cluster_;
     };
     return std::any_of(places_.begin(), places_.end(), [&](const Vector2d& x) { return near(a, x) || near(b, x); });
   }
@@ -251,8 +255,10 @@ class Finder {
       const auto [b_min, b_max] = std::minmax(b.first()[axis], b.last()[axis]);
       const double low = std::max(a_min, b_min), high = std::min(a_max, b_max);
       if (low > high) return;
-      const Vector2d x = a.first()[axis] == low ? a.first() : a.last()[axis] == low ? a.last()
-                         : b.first()[axis] == low ? b.first() : b.last();
+      const Vector2d x = a.first()[axis] == low   ? a.first()
+                         : a.last()[axis] == low  ? a.last()
+                         : b.first()[axis] == low ? b.first()
+                                                  : b.last();
       if (low < high) {
         add(ContactKind::overlap, a, b, x);
       } else {
@@ -363,7 +369,7 @@ class Finder {
   std::vector<Piece> pieces_;
   std::vector<int> next_;
   std::vector<LoopContact> contacts_;
-  std::vector<Vector2d> places_;               // of the contacts, scaled
+  std::vector<Vector2d> places_;  // of the contacts, scaled
   Vector2d scale_{1, 1};
   double margin_ = 0, smallest_ = 0;
   static constexpr double cluster_ = 1e-7;

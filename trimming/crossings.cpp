@@ -23,7 +23,9 @@ template <class T>
 int sign_of(const T& x) {
   return static_cast<int>(CGAL::sign(x));
 }
-int sign_of(double x) { return (x > 0) - (x < 0); }
+int sign_of(double x) {
+  return (x > 0) - (x < 0);
+}
 
 template <class T>
 T exact_coefficient(const LineForm& form, int i) {
@@ -100,7 +102,9 @@ Polynomial greatest_common_divisor(Polynomial a, Polynomial b) {
   return a;
 }
 
-Polynomial quotient(Polynomial a, const Polynomial& b) { return divide(a, b); }
+Polynomial quotient(Polynomial a, const Polynomial& b) {
+  return divide(a, b);
+}
 
 Polynomial subtract(Polynomial a, const Polynomial& b) {
   a.resize(std::max(a.size(), b.size()));
@@ -194,7 +198,8 @@ std::vector<T> halve(std::vector<T>& b) {
 
 struct TooDeep {};
 
-// Roots in the open (lo, hi) of exact Bernstein coefficients. Throws TooDeep when several variations remain at max_depth.
+// Roots in the open (lo, hi) of exact Bernstein coefficients. Throws TooDeep when several variations remain at
+// max_depth.
 template <class T>
 void isolate(std::vector<T> b, double lo, double hi, int depth, int max_depth, std::vector<LineRoot>& out) {
   const int count = variations(b);
@@ -540,7 +545,8 @@ int compare(const LineForm& f, LineRoot& a, const LineForm& g, LineRoot& b, Pred
       if (have_common_root(f, g, std::max(a.lo, b.lo), std::min(a.hi, b.hi), counts)) return 0;
     }
     const bool first = a.hi - a.lo >= b.hi - b.lo;
-    if (!(first ? bisect(f, a, counts) : bisect(g, b, counts)) && !(first ? bisect(g, b, counts) : bisect(f, a, counts)))
+    if (!(first ? bisect(f, a, counts) : bisect(g, b, counts)) &&
+        !(first ? bisect(g, b, counts) : bisect(f, a, counts)))
       break;
   }
   DeepRoot x(f, a), y(g, b);
@@ -560,7 +566,7 @@ int orientation(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen:
   // [Shewchuk 1997, orient2d: (3 + 16 eps) eps]
   if (std::abs(det) > 4 * epsilon * (std::abs(left) + std::abs(right))) return sign_of(det);
   return sign_of((Dyadic(b.x()) - Dyadic(a.x())) * (Dyadic(c.y()) - Dyadic(a.y())) -
-              (Dyadic(b.y()) - Dyadic(a.y())) * (Dyadic(c.x()) - Dyadic(a.x())));
+                 (Dyadic(b.y()) - Dyadic(a.y())) * (Dyadic(c.x()) - Dyadic(a.x())));
 }
 
 }  // namespace toile

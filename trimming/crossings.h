@@ -11,8 +11,8 @@ namespace toile {
 
 enum class Axis { u, v };
 
-// The numerator of (coordinate - c) along a span: Bernstein coefficients w_i (x_i - c), whose signs are comparisons of the
-// given doubles. The span must outlive the form.
+// The numerator of (coordinate - c) along a span: Bernstein coefficients w_i (x_i - c), whose signs are comparisons of
+// the given doubles. The span must outlive the form.
 class LineForm {
  public:
   LineForm(const TrimSpan& span, Axis axis, double c);
@@ -56,8 +56,9 @@ struct LineRoot {
 // Exact sign of the form at s in [0, 1].
 int sign_at(const LineForm& form, double s, PredicateCounts& counts);
 
-// All roots in the open (0, 1), ascending, their intervals disjoint and as narrow as plain arithmetic certifies. The form
-// must not be zero. [Lane & Riesenfeld 1981: variation counting; Yun 1976: square-free factors where roots are multiple]
+// All roots in the open (0, 1), ascending, their intervals disjoint and as narrow as plain arithmetic certifies. The
+// form must not be zero. [Lane & Riesenfeld 1981: variation counting; Yun 1976: square-free factors where roots are
+// multiple]
 std::vector<LineRoot> roots(const LineForm& form, PredicateCounts& counts);
 
 // Exact sign of `form` at a root of `of`, both on one span; narrows the root.

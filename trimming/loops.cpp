@@ -46,14 +46,17 @@ class Validator {
   }
 
  private:
-  [[noreturn]] void fail(const TrimLoop& loop, const TrimCurve* curve, const std::string& what, const Vector2d& uv) const {
+  [[noreturn]] void fail(const TrimLoop& loop, const TrimCurve* curve, const std::string& what,
+                         const Vector2d& uv) const {
     throw GeometryError(place_name(surface_, loop, curve) + ": " + what + " at " + point_text(uv));
   }
   void report(const TrimLoop& loop, const std::string& what, double move, const Vector2d& place) {
     repairs_.push_back({loop.index, what, move, place});
   }
 
-  static Vector2d start(const TrimCurve& c) { return c.curve.points().col(c.reversed ? c.curve.points().cols() - 1 : 0); }
+  static Vector2d start(const TrimCurve& c) {
+    return c.curve.points().col(c.reversed ? c.curve.points().cols() - 1 : 0);
+  }
   static Vector2d end(const TrimCurve& c) { return c.curve.points().col(c.reversed ? 0 : c.curve.points().cols() - 1); }
   static void set_points(TrimCurve& c, const Curve2::Points& points) {
     c.curve = Curve2(c.curve.knots(), points, c.curve.weights());
@@ -106,7 +109,8 @@ class Validator {
       loop.gap = std::max(loop.gap, (a - b).norm());
       if (within_tolerance(a, b)) continue;
       fail(loop, &c[k],
-           "the loop is open: a gap of " + text((a - b).norm()) + " to curve " + std::to_string(c[(k + 1) % n].index), a);
+           "the loop is open: a gap of " + text((a - b).norm()) + " to curve " + std::to_string(c[(k + 1) % n].index),
+           a);
     }
   }
 
@@ -137,7 +141,8 @@ class Validator {
     for (TrimCurve& c : loop.curves) {
       for (const Axis axis : {Axis::u, Axis::v}) {
         const Eigen::Index a = axis == Axis::u ? 0 : 1;
-        const double min = lines_[static_cast<std::size_t>(a)].front(), max = lines_[static_cast<std::size_t>(a)].back();
+        const double min = lines_[static_cast<std::size_t>(a)].front(),
+                     max = lines_[static_cast<std::size_t>(a)].back();
         for (const bool beyond_max : {false, true}) {
           Curve2::Points points = c.curve.points();
           const double hull = beyond_max ? points.row(a).maxCoeff() - max : min - points.row(a).minCoeff();
@@ -177,12 +182,14 @@ class Validator {
           const double x = points(axis, k);
           const auto above = std::lower_bound(lines.begin(), lines.end(), x);
           double nearest = above == lines.end() ? lines.back() : *above;
-          if (above != lines.begin() && std::abs(x - *std::prev(above)) < std::abs(x - nearest)) nearest = *std::prev(above);
+          if (above != lines.begin() && std::abs(x - *std::prev(above)) < std::abs(x - nearest))
+            nearest = *std::prev(above);
           // Cheap bound first: no snap is longer than 1e-3 of the repair tolerance.
           if (x == nearest || std::abs(x - nearest) > 1e-3 * tolerance_[axis]) continue;
           if (std::abs(x - nearest) > snap_distance(points.col(k))[axis]) continue;
           points(axis, k) = nearest;
-          report(loop, "snapped curve " + std::to_string(c.index) + " to " + (axis == 0 ? "u = " : "v = ") + text(nearest),
+          report(loop,
+                 "snapped curve " + std::to_string(c.index) + " to " + (axis == 0 ? "u = " : "v = ") + text(nearest),
                  std::abs(x - nearest), points.col(k));
         }
       }
@@ -229,9 +236,10 @@ class Validator {
       const TrimLoop& b = surface_.loops[static_cast<std::size_t>(contact.loop_b)];
       const TrimCurve& curve_a = a.curves[static_cast<std::size_t>(contact.curve_a)];
       const TrimCurve& curve_b = b.curves[static_cast<std::size_t>(contact.curve_b)];
-      const std::string other = contact.loop_a == contact.loop_b
-                                    ? (contact.curve_a == contact.curve_b ? " itself" : " curve " + std::to_string(curve_b.index))
-                                    : " loop " + std::to_string(b.index) + ", curve " + std::to_string(curve_b.index) + ",";
+      const std::string other =
+          contact.loop_a == contact.loop_b
+              ? (contact.curve_a == contact.curve_b ? " itself" : " curve " + std::to_string(curve_b.index))
+              : " loop " + std::to_string(b.index) + ", curve " + std::to_string(curve_b.index) + ",";
       if (contact.kind == ContactKind::crossing) fail(a, &curve_a, "crosses" + other, contact.uv);
       if (contact.kind == ContactKind::overlap) fail(a, &curve_a, "runs along" + other, contact.uv);
       report(a, "curve " + std::to_string(curve_a.index) + " touches" + other, 0, contact.uv);
@@ -293,9 +301,11 @@ class Validator {
         if (other == l) continue;
         const TrimLoop& of = surface_.loops[static_cast<std::size_t>(other)];
         const bool within = winding_of_loop(l, other) != 0;
-        if (of.kind == LoopKind::outer && !within) fail(loop, nullptr, "the hole lies outside the outer loop", start(loop.curves.front()));
+        if (of.kind == LoopKind::outer && !within)
+          fail(loop, nullptr, "the hole lies outside the outer loop", start(loop.curves.front()));
         if (of.kind == LoopKind::hole && within)
-          fail(loop, nullptr, "the hole lies inside loop " + std::to_string(of.index) + ", another hole", start(loop.curves.front()));
+          fail(loop, nullptr, "the hole lies inside loop " + std::to_string(of.index) + ", another hole",
+               start(loop.curves.front()));
       }
     }
   }

@@ -12,9 +12,9 @@ namespace toile {
 
 // One change that validation made, or found tolerable: reported, never silent.
 struct LoopRepair {
-  int loop = 0;                 // file's number
-  std::string what;             // "reversed", "closed a gap of 3e-9", "moved into the domain", "snapped to u = 0.5", ...
-  double move = 0;              // largest move in the parameter plane
+  int loop = 0;      // file's number
+  std::string what;  // "reversed", "closed a gap of 3e-9", "moved into the domain", "snapped to u = 0.5", ...
+  double move = 0;   // largest move in the parameter plane
   Eigen::Vector2d place{0, 0};  // where
 };
 
@@ -28,9 +28,9 @@ struct LoopOptions {
 };
 
 // Makes every loop closed (end points of neighbours bitwise equal), simple, oriented (outer counter-clockwise, holes
-// clockwise by signed area) and nested (holes inside the outer loop, disjoint), moving points only within the tolerances;
-// `knots_u/v` are the knot lines that ends snap to. Throws GeometryError naming panel, loop, curve and place where a loop
-// can't be made valid. Decisions are exact; the curves keep index and direction of the file.
+// clockwise by signed area) and nested (holes inside the outer loop, disjoint), moving points only within the
+// tolerances; `knots_u/v` are the knot lines that ends snap to. Throws GeometryError naming panel, loop, curve and
+// place where a loop can't be made valid. Decisions are exact; the curves keep index and direction of the file.
 std::vector<LoopRepair> validate_loops(TrimmedSurface& surface, const LoopOptions& options = {});
 
 }  // namespace toile

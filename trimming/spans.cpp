@@ -24,7 +24,9 @@ Wide operator+(Wide a, Wide b) {
   return two_sum(s.hi, s.lo + t.lo);
 }
 
-Wide operator-(Wide a, Wide b) { return a + Wide{-b.hi, -b.lo}; }
+Wide operator-(Wide a, Wide b) {
+  return a + Wide{-b.hi, -b.lo};
+}
 
 Wide operator*(Wide a, Wide b) {
   const double p = a.hi * b.hi;
@@ -45,7 +47,9 @@ struct Homogeneous {
 };
 
 // Exactly a where the ends agree.
-Wide lerp(Wide a, Wide b, Wide s) { return a + s * (b - a); }
+Wide lerp(Wide a, Wide b, Wide s) {
+  return a + s * (b - a);
+}
 
 // Bezier control point k of knot span i: the blossom at (min, ..., min, max, ..., max) with k times max.
 Homogeneous blossom(const Curve2& curve, bool rational, int i, int k) {
@@ -91,7 +95,8 @@ Eigen::Vector2d TrimSpan::at(double s) const {
   if (s <= 0) return first();
   if (s >= 1) return last();
   std::array<Eigen::Vector3d, max_degree + 1> d;
-  for (std::size_t i = 0; i <= static_cast<std::size_t>(degree); ++i) d[i] = Eigen::Vector3d(u[i] * w[i], v[i] * w[i], w[i]);
+  for (std::size_t i = 0; i <= static_cast<std::size_t>(degree); ++i)
+    d[i] = Eigen::Vector3d(u[i] * w[i], v[i] * w[i], w[i]);
   for (int r = degree; r > 0; --r) {
     for (std::size_t i = 0; i < static_cast<std::size_t>(r); ++i) d[i] = (1 - s) * d[i] + s * d[i + 1];
   }

@@ -13,8 +13,10 @@ namespace toile {
 // One polynomial or rational Bezier piece of a trim curve, Euclidean control points, weights > 0.
 //   (1) s in [0, 1] maps to t = range.min + s * range.length();
 //   (2) neighbours on one curve share their end point bitwise;
-//   (3) where the curve's knots are Bezier knots already, the points are the curve's own doubles; else they come from one
-//       extraction in twice the precision, rounded once: control points that share a coordinate give points that share it.
+//   (3) where the curve's knots are Bezier knots already, the points are the curve's own doubles; else they come from
+//   one
+//       extraction in twice the precision, rounded once: control points that share a coordinate give points that share
+//       it.
 struct TrimSpan {
   int loop = 0, curve = 0;  // positions in TrimmedSurface::loops and TrimLoop::curves
   Interval range;           // parameters of the curve as given
@@ -27,7 +29,7 @@ struct TrimSpan {
   double t(double s) const;  // range.min and range.max bitwise at 0 and 1
   // Position at s in [0, 1].
   Eigen::Vector2d at(double s) const;
-  bool degenerate() const;   // all control points equal
+  bool degenerate() const;  // all control points equal
 };
 
 // All spans of a surface's trims: curve by curve in loop order, ascending t on each curve.

@@ -19,7 +19,9 @@ struct Place {
   bool operator==(const Place&) const = default;
 };
 
-bool on_line(int place) { return place % 2 == 0; }
+bool on_line(int place) {
+  return place % 2 == 0;
+}
 
 int place_of(double x, const std::vector<double>& lines) {
   const auto at = std::lower_bound(lines.begin(), lines.end(), x);
@@ -116,7 +118,8 @@ class Tracer {
     // Insertion sort: the comparison narrows what it compares.
     for (std::vector<SpanEvent>* list : {&of_u, &of_v}) {
       for (std::size_t i = 1; i < list->size(); ++i) {
-        for (std::size_t k = i; k > 0 && ascending((*list)[k], (*list)[k - 1]); --k) std::swap((*list)[k], (*list)[k - 1]);
+        for (std::size_t k = i; k > 0 && ascending((*list)[k], (*list)[k - 1]); --k)
+          std::swap((*list)[k], (*list)[k - 1]);
       }
     }
     std::size_t i = 0, j = 0;
@@ -162,7 +165,8 @@ class Tracer {
       } else if (on_line(place)) {
         node.uv[axis] = all[static_cast<std::size_t>(place / 2)];
       } else {
-        const double low = all[static_cast<std::size_t>(place / 2)], high = all[static_cast<std::size_t>(place / 2 + 1)];
+        const double low = all[static_cast<std::size_t>(place / 2)],
+                     high = all[static_cast<std::size_t>(place / 2 + 1)];
         node.uv[axis] = std::clamp(node.uv[axis], low, high);
         const double spread = std::abs(span.at(event.root.hi)[axis] - span.at(event.root.lo)[axis]);
         node.error = spread + 8 * std::numeric_limits<double>::epsilon() * std::max(std::abs(low), std::abs(high));
@@ -330,11 +334,11 @@ class Tracer {
   // An end of an arc on the border of its cell.
   struct End {
     int arc = 0;
-    bool leaves = false;   // the arc leaves the cell here
-    int side = 0;          // 0 bottom, 1 right, 2 top, 3 left, counter-clockwise
-    bool corner = false;   // at the start of the side
+    bool leaves = false;  // the arc leaves the cell here
+    int side = 0;         // 0 bottom, 1 right, 2 top, 3 left, counter-clockwise
+    bool corner = false;  // at the start of the side
     double along = 0, error = 0;
-    double angle = 0;      // into the cell, from the direction the border comes from
+    double angle = 0;  // into the cell, from the direction the border comes from
   };
 
   void classify() {
@@ -344,7 +348,8 @@ class Tracer {
     out_.vertices.assign(static_cast<std::size_t>((nu + 1) * (nv + 1)), VertexKind::outside);
     std::vector<std::vector<int>> arcs_of(static_cast<std::size_t>(nu * nv));
     // Change of the winding number from left to right just above row line j: across line i, and inside cell (i, j).
-    std::vector<int> across(static_cast<std::size_t>((nu + 1) * (nv + 1)), 0), within(static_cast<std::size_t>(nu * nv), 0);
+    std::vector<int> across(static_cast<std::size_t>((nu + 1) * (nv + 1)), 0),
+        within(static_cast<std::size_t>(nu * nv), 0);
     for (std::size_t a = 0; a < arcs_.size(); ++a) {
       const Arc& arc = arcs_[a];
       if (on_line(arc.place.v)) continue;
@@ -402,7 +407,11 @@ class Tracer {
     end.arc = a;
     end.leaves = leaves;
     end.corner = pu != 1 && pv != 1;
-    end.side = end.corner ? (pv == 0 ? (pu == 0 ? 0 : 1) : (pu == 2 ? 2 : 3)) : (pv == 0 ? 0 : pu == 2 ? 1 : pv == 2 ? 2 : 3);
+    end.side = end.corner ? (pv == 0 ? (pu == 0 ? 0 : 1) : (pu == 2 ? 2 : 3))
+                          : (pv == 0   ? 0
+                             : pu == 2 ? 1
+                             : pv == 2 ? 2
+                                       : 3);
     if (!end.corner) {
       const double x = end.side % 2 == 0 ? node.uv.x() : node.uv.y();
       end.along = end.side < 2 ? x : -x;
@@ -444,8 +453,9 @@ class Tracer {
     return (span->at(s + (up ? reach : -reach)) - span->at(s)).normalized();
   }
 
-  // Ends in order along the border from its bottom left corner, leaving and entering in turn. Loops don't cross, so where
-  // ends share a place (touches) or are too close to tell apart, the turn decides; among equals the direction does.
+  // Ends in order along the border from its bottom left corner, leaving and entering in turn. Loops don't cross, so
+  // where ends share a place (touches) or are too close to tell apart, the turn decides; among equals the direction
+  // does.
   std::vector<End> border_order(int i, int j, const std::vector<int>& arcs, bool inside) const {
     std::vector<End> ends;
     for (const int a : arcs) {
@@ -508,7 +518,9 @@ class Tracer {
     const std::vector<End> ends = border_order(i, j, arcs, inside);
     // Position of each arc's ends in the order.
     std::vector<int> leaves_at(arcs.size(), -1);
-    const auto local = [&](int a) { return static_cast<std::size_t>(std::lower_bound(arcs.begin(), arcs.end(), a) - arcs.begin()); };
+    const auto local = [&](int a) {
+      return static_cast<std::size_t>(std::lower_bound(arcs.begin(), arcs.end(), a) - arcs.begin());
+    };
     for (std::size_t k = 0; k < ends.size(); ++k) {
       if (ends[k].leaves) leaves_at[local(ends[k].arc)] = static_cast<int>(k);
     }
@@ -551,20 +563,30 @@ class Tracer {
 
 }  // namespace
 
-KnotMesh knot_mesh(const NurbsSurface& surface) { return {surface.u().breaks(), surface.v().breaks()}; }
+KnotMesh knot_mesh(const NurbsSurface& surface) {
+  return {surface.u().breaks(), surface.v().breaks()};
+}
 
 const char* name(PointKind kind) {
   switch (kind) {
-    case PointKind::vertex: return "vertex";
-    case PointKind::crossing_u: return "crossing_u";
-    case PointKind::crossing_v: return "crossing_v";
-    case PointKind::tangent_u: return "tangent_u";
-    case PointKind::tangent_v: return "tangent_v";
-    case PointKind::crossing_uv: return "crossing_uv";
+    case PointKind::vertex:
+      return "vertex";
+    case PointKind::crossing_u:
+      return "crossing_u";
+    case PointKind::crossing_v:
+      return "crossing_v";
+    case PointKind::tangent_u:
+      return "tangent_u";
+    case PointKind::tangent_v:
+      return "tangent_v";
+    case PointKind::crossing_uv:
+      return "crossing_uv";
   }
   return "";
 }
 
-TrimTopology trace_trims(const TrimmedSurface& surface) { return Tracer(surface).run(); }
+TrimTopology trace_trims(const TrimmedSurface& surface) {
+  return Tracer(surface).run();
+}
 
 }  // namespace toile

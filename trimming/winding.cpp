@@ -5,8 +5,8 @@
 namespace toile {
 namespace {
 
-// Crossings of the ray to the right of the point, just below v = point.v: 1 upwards, -1 downwards. Nothing where the point
-// lies on the span.
+// Crossings of the ray to the right of the point, just below v = point.v: 1 upwards, -1 downwards. Nothing where the
+// point lies on the span.
 std::optional<int> ray_crossings(const TrimSpan& span, const Eigen::Vector2d& point, PredicateCounts& counts) {
   const auto [v_min, v_max] = std::minmax_element(span.v.begin(), span.v.begin() + span.degree + 1);
   if (*v_max < point.y() || *v_min > point.y()) return 0;

@@ -22,8 +22,12 @@ TEST(ConstraintPoints, AnExplicitBorderTrimHasCrossings) {
   TrimmedSurface face = trimmed(unit_cells(8), {polygon_loop({{0, 0}, {8, 0}, {8, 8}, {0, 8}})});
   const auto points = points_of(face);
   EXPECT_EQ(points.size(), 81u);
-  EXPECT_EQ(std::count_if(points.begin(), points.end(), [](const ConstraintPoint& p) { return p.kind == PointKind::vertex; }), 49);
-  EXPECT_EQ(std::count_if(points.begin(), points.end(), [](const ConstraintPoint& p) { return p.kind == PointKind::crossing_uv && p.loop == 0; }), 32);
+  EXPECT_EQ(
+      std::count_if(points.begin(), points.end(), [](const ConstraintPoint& p) { return p.kind == PointKind::vertex; }),
+      49);
+  EXPECT_EQ(std::count_if(points.begin(), points.end(),
+                          [](const ConstraintPoint& p) { return p.kind == PointKind::crossing_uv && p.loop == 0; }),
+            32);
   // Corner k is where curve k starts.
   EXPECT_EQ(points[49].curve, 0);
   EXPECT_EQ(points[49].t, face.loops[0].curves[0].curve.domain().min);
@@ -61,11 +65,14 @@ TEST(ConstraintPoints, NumbersSurviveReversal) {
     EXPECT_TRUE(loop.curves.size() == 1 || loop.curves.front().index > loop.curves.back().index);
     ASSERT_EQ(points.size(), expected.size());
     for (const ConstraintPoint& p : points) {
-      const auto same = std::find_if(expected.begin(), expected.end(), [&](const ConstraintPoint& q) { return q.u == p.u && q.v == p.v; });
+      const auto same = std::find_if(expected.begin(), expected.end(),
+                                     [&](const ConstraintPoint& q) { return q.u == p.u && q.v == p.v; });
       ASSERT_NE(same, expected.end());
       EXPECT_EQ(p.kind, same->kind);
       if (p.loop < 0) continue;
-      const Curve2& curve = std::find_if(loop.curves.begin(), loop.curves.end(), [&](const TrimCurve& c) { return c.index == p.curve; })->curve;
+      const Curve2& curve = std::find_if(loop.curves.begin(), loop.curves.end(), [&](const TrimCurve& c) {
+                              return c.index == p.curve;
+                            })->curve;
       EXPECT_LE((curve(p.t) - Vector2d(p.u, p.v)).norm(), 1e-14);
       // A joint is listed on the later curve in the file's order, or at a single curve's start.
       if (p.t == curve.domain().min || p.t == curve.domain().max) {

@@ -7,7 +7,9 @@ namespace {
 
 const std::vector<Vector2d> square = {{0.5, 0.5}, {3.5, 0.5}, {3.5, 3.5}, {0.5, 3.5}};
 
-TrimmedSurface with_outline(TrimLoop loop) { return trimmed(unit_cells(4), {std::move(loop)}); }
+TrimmedSurface with_outline(TrimLoop loop) {
+  return trimmed(unit_cells(4), {std::move(loop)});
+}
 
 void expect_error(TrimmedSurface surface, const std::vector<std::string>& parts) {
   try {
@@ -19,11 +21,13 @@ void expect_error(TrimmedSurface surface, const std::vector<std::string>& parts)
 }
 
 bool reports(const std::vector<LoopRepair>& repairs, const std::string& what) {
-  return std::any_of(repairs.begin(), repairs.end(), [&](const LoopRepair& r) { return r.what.find(what) != std::string::npos; });
+  return std::any_of(repairs.begin(), repairs.end(),
+                     [&](const LoopRepair& r) { return r.what.find(what) != std::string::npos; });
 }
 
 TEST(LoopValidation, LeavesGoodLoopsAlone) {
-  for (const TrimLoop& loop : {polygon_loop(square), loop_of({round_curve({2, 2}, 1.5)}), loop_of({round_curve({2, 2}, 2)})}) {
+  for (const TrimLoop& loop :
+       {polygon_loop(square), loop_of({round_curve({2, 2}, 1.5)}), loop_of({round_curve({2, 2}, 2)})}) {
     TrimmedSurface face = with_outline(loop);
     EXPECT_TRUE(validate_loops(face).empty());
     EXPECT_EQ(face.loops[0].gap, 0);
@@ -79,16 +83,21 @@ TEST(LoopValidation, RefusesOpenLoops) {
 }
 
 TEST(LoopValidation, RefusesAFigureEight) {
-  expect_error(with_outline(polygon_loop({{1, 1}, {3, 3}, {3, 1}, {1, 3}})), {"panel 'panel', loop 0, curve", "crosses curve", "(u, v) = (2, 2)"});
+  expect_error(with_outline(polygon_loop({{1, 1}, {3, 3}, {3, 1}, {1, 3}})),
+               {"panel 'panel', loop 0, curve", "crosses curve", "(u, v) = (2, 2)"});
   // Curved.
-  expect_error(with_outline(loop_of({bezier_curve({{1, 1}, {2.5, 2}, {3, 3}}), bezier_curve({{3, 3}, {3.5, 2}, {3, 1}}), bezier_curve({{3, 1}, {2, 1.5}, {1, 3}}), line_segment<2>({1, 3}, {1, 1})})),
+  expect_error(with_outline(loop_of({bezier_curve({{1, 1}, {2.5, 2}, {3, 3}}), bezier_curve({{3, 3}, {3.5, 2}, {3, 1}}),
+                                     bezier_curve({{3, 1}, {2, 1.5}, {1, 3}}), line_segment<2>({1, 3}, {1, 1})})),
                {"loop 0, curve", "crosses curve"});
   // A loop within one span.
-  expect_error(with_outline(loop_of({bezier_curve({{1, 1}, {6, 4}, {-2, 4}, {3, 1}}), line_segment<2>({3, 1}, {1, 1})})), {"loop 0, curve 0: crosses"});
+  expect_error(
+      with_outline(loop_of({bezier_curve({{1, 1}, {6, 4}, {-2, 4}, {3, 1}}), line_segment<2>({3, 1}, {1, 1})})),
+      {"loop 0, curve 0: crosses"});
 }
 
 TEST(LoopValidation, ACuspIsNoCrossing) {
-  TrimmedSurface face = with_outline(loop_of({bezier_curve({{1, 1}, {4, 3}, {4, 1}, {1, 3}}), line_segment<2>({1, 3}, {1, 1})}));
+  TrimmedSurface face =
+      with_outline(loop_of({bezier_curve({{1, 1}, {4, 3}, {4, 1}, {1, 3}}), line_segment<2>({1, 3}, {1, 1})}));
   EXPECT_TRUE(validate_loops(face).empty());
   expect_laws(face, trace_trims(face));
 }
@@ -98,12 +107,14 @@ TEST(LoopValidation, RefusesRetracedLoops) {
 }
 
 TEST(LoopValidation, RefusesHolesOutside) {
-  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop({{1, 1}, {2, 1}, {2, 2}, {1, 2}}), backwards(loop_of({round_curve({3, 3}, 0.5)}))});
+  TrimmedSurface face = trimmed(
+      unit_cells(4), {polygon_loop({{1, 1}, {2, 1}, {2, 2}, {1, 2}}), backwards(loop_of({round_curve({3, 3}, 0.5)}))});
   expect_error(face, {"panel 'panel', loop 1", "outside the outer loop"});
 }
 
 TEST(LoopValidation, RefusesHolesThatCrossTheOutline) {
-  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3.5, 2}, 0.5)}))});
+  TrimmedSurface face =
+      trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3.5, 2}, 0.5)}))});
   expect_error(face, {"panel 'panel', loop", "crosses", "(u, v) = (3.5, "});
 }
 
@@ -123,12 +134,14 @@ TEST(LoopValidation, ReportsTouchesAndKeepsThem) {
 
 TEST(LoopValidation, NearMissesAreNoContacts) {
   for (const double gap : {1e-3, 1e-8, 1e-12}) {
-    TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3 - gap, 2}, 0.5)}))});
+    TrimmedSurface face =
+        trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3 - gap, 2}, 0.5)}))});
     EXPECT_TRUE(validate_loops(face).empty()) << gap;
   }
   // Two arcs of nearly one curvature, 1e-10 apart all along.
-  TrimmedSurface lune = with_outline(loop_of({bezier_curve({{1, 1}, {2, 0.5}, {3, 1}}), line_segment<2>({3, 1}, {3, 1 + 1e-10}),
-                                              bezier_curve({{3, 1 + 1e-10}, {2, 0.5 + 1e-10}, {1, 1 + 1e-10}}), line_segment<2>({1, 1 + 1e-10}, {1, 1})}));
+  TrimmedSurface lune = with_outline(loop_of(
+      {bezier_curve({{1, 1}, {2, 0.5}, {3, 1}}), line_segment<2>({3, 1}, {3, 1 + 1e-10}),
+       bezier_curve({{3, 1 + 1e-10}, {2, 0.5 + 1e-10}, {1, 1 + 1e-10}}), line_segment<2>({1, 1 + 1e-10}, {1, 1})}));
   EXPECT_TRUE(validate_loops(lune).empty());
   expect_laws(lune, trace_trims(lune));
 }
@@ -139,9 +152,11 @@ TEST(LoopValidation, MovesSmallExcursionsIntoTheDomain) {
   EXPECT_TRUE(reports(repairs, "into the domain"));
   expect_laws(face, trace_trims(face));
   expect_near_rel(loop_area(face), 16, 1e-14);
-  expect_error(with_outline(polygon_loop({{-0.1, 0}, {4, 0}, {4, 4}, {0, 4}})), {"loop 0, curve", "leaves the domain by 0.1", "(-0.1, 0)"});
+  expect_error(with_outline(polygon_loop({{-0.1, 0}, {4, 0}, {4, 4}, {0, 4}})),
+               {"loop 0, curve", "leaves the domain by 0.1", "(-0.1, 0)"});
   // Control points outside don't matter where the curve stays within.
-  TrimmedSurface hull = with_outline(loop_of({bezier_curve({{1, 1}, {2, -0.5}, {3, 1}}), line_segment<2>({3, 1}, {2, 3}), line_segment<2>({2, 3}, {1, 1})}));
+  TrimmedSurface hull = with_outline(loop_of(
+      {bezier_curve({{1, 1}, {2, -0.5}, {3, 1}}), line_segment<2>({3, 1}, {2, 3}), line_segment<2>({2, 3}, {1, 1})}));
   EXPECT_TRUE(validate_loops(hull).empty());
 }
 
@@ -169,7 +184,8 @@ TEST(LoopValidation, NeedsOneOuterLoop) {
 TEST(LoopValidation, UnclampedCurvesGetTheirEnds) {
   // A closed uniform quadratic B-spline: its ends meet though no control point lies on it.
   std::vector<Vector2d> ring;
-  for (int k = 0; k < 8; ++k) ring.emplace_back(2 + 1.5 * std::cos(k % 6 * M_PI / 3), 2 + 1.5 * std::sin(k % 6 * M_PI / 3));
+  for (int k = 0; k < 8; ++k)
+    ring.emplace_back(2 + 1.5 * std::cos(k % 6 * M_PI / 3), 2 + 1.5 * std::sin(k % 6 * M_PI / 3));
   Curve2::Points points(2, 8);
   for (int k = 0; k < 8; ++k) points.col(k) = ring[static_cast<std::size_t>(k)];
   TrimmedSurface face = with_outline(loop_of({Curve2(KnotVector(2, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}), points)}));

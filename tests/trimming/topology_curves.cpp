@@ -61,10 +61,20 @@ TEST(TrimTopology, SplineOnALineStaysOnIt) {
   Curve2::Points points(2, 7);
   points << 3.5, 3.1, 2.7, 1.9, 1.3, 0.9, 0.5, 2, 2, 2, 2, 2, 2, 2;
   for (const bool rational : {false, true}) {
-    const Curve2 top(knots, points, rational ? std::vector<double>{1, 0.3, 2.7, 1.1, 0.9, 5, 1} : std::vector<double>{});
-    const TrimmedSurface face = trimmed(unit_cells(4), {loop_of({line_segment<2>({0.5, 2}, {0.5, 0.5}), line_segment<2>({0.5, 0.5}, {3.5, 0.5}),
-                                                                 line_segment<2>({3.5, 0.5}, {3.5, 2}), top})});
-    expect_tally(face, {.crossing_u = 3, .crossing_v = 2, .tangent_v = 2, .crossing_uv = 3, .inside = 2, .cut = 6, .outside = 8, .vertices = 3},
+    const Curve2 top(knots, points,
+                     rational ? std::vector<double>{1, 0.3, 2.7, 1.1, 0.9, 5, 1} : std::vector<double>{});
+    const TrimmedSurface face =
+        trimmed(unit_cells(4), {loop_of({line_segment<2>({0.5, 2}, {0.5, 0.5}), line_segment<2>({0.5, 0.5}, {3.5, 0.5}),
+                                         line_segment<2>({3.5, 0.5}, {3.5, 2}), top})});
+    expect_tally(face,
+                 {.crossing_u = 3,
+                  .crossing_v = 2,
+                  .tangent_v = 2,
+                  .crossing_uv = 3,
+                  .inside = 2,
+                  .cut = 6,
+                  .outside = 8,
+                  .vertices = 3},
                  !rational);
   }
 }

@@ -1,5 +1,5 @@
-// Random trims on a coarse lattice, where lines, vertices and runs are hit all the time, against exact rational arithmetic
-// that shares nothing with the tracer.
+// Random trims on a coarse lattice, where lines, vertices and runs are hit all the time, against exact rational
+// arithmetic that shares nothing with the tracer.
 #include <boost/multiprecision/cpp_int.hpp>
 #include <random>
 
@@ -15,8 +15,12 @@ struct Point {
   bool operator==(const Point& o) const { return x == o.x && y == o.y; }
 };
 
-Rational cross(const Point& a, const Point& b, const Point& c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
-bool is_integer(const Rational& x) { return denominator(x) == 1; }
+Rational cross(const Point& a, const Point& b, const Point& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+bool is_integer(const Rational& x) {
+  return denominator(x) == 1;
+}
 int floor_of(const Rational& x) {
   const boost::multiprecision::cpp_int q = numerator(x) / denominator(x);
   return static_cast<int>(numerator(x) < 0 && !is_integer(x) ? q - 1 : q);
@@ -65,8 +69,8 @@ bool meets_open_cell(const Point& a, const Point& b, int i, int j) {
   return low < high;
 }
 
-// Where the border of the polygon meets integer lines, by the contract: all stops along it (corners, crossings) that are on
-// a line, without those in the middle of a run.
+// Where the border of the polygon meets integer lines, by the contract: all stops along it (corners, crossings) that
+// are on a line, without those in the middle of a run.
 std::map<PointKind, int> expected_events(const std::vector<Point>& corners) {
   std::vector<Point> stops;
   for (std::size_t k = 0; k < corners.size(); ++k) {
@@ -94,11 +98,13 @@ std::map<PointKind, int> expected_events(const std::vector<Point>& corners) {
     const auto coordinate = [&](const Point& q) { return is_integer(p.x) ? q.x : q.y; };
     // Stops next to this one that leave the line, before and after.
     std::size_t before = k + n - 1, after = k + 1;
-    const bool runs_in = coordinate(stops[before % n]) == coordinate(p), runs_out = coordinate(stops[after % n]) == coordinate(p);
+    const bool runs_in = coordinate(stops[before % n]) == coordinate(p),
+               runs_out = coordinate(stops[after % n]) == coordinate(p);
     if (runs_in && runs_out) continue;
     while (coordinate(stops[before % n]) == coordinate(p)) before += n - 1;
     while (coordinate(stops[after % n]) == coordinate(p)) ++after;
-    const bool crosses = (coordinate(stops[before % n]) < coordinate(p)) != (coordinate(stops[after % n]) < coordinate(p));
+    const bool crosses =
+        (coordinate(stops[before % n]) < coordinate(p)) != (coordinate(stops[after % n]) < coordinate(p));
     ++count[is_integer(p.x) ? (crosses ? PointKind::crossing_u : PointKind::tangent_u)
                             : (crosses ? PointKind::crossing_v : PointKind::tangent_v)];
   }
@@ -112,10 +118,11 @@ std::vector<Point> random_star(std::mt19937& random, int size, int corners) {
   std::vector<Point> p;
   for (int k = 0; k < corners; ++k) p.push_back({Rational(coordinate(random), 4), Rational(coordinate(random), 4)});
   const auto upper = [&](const Point& q) { return q.y > centre.y || (q.y == centre.y && q.x > centre.x); };
-  std::sort(p.begin(), p.end(), [&](const Point& a, const Point& b) {
-    return upper(a) != upper(b) ? upper(a) : cross(centre, a, b) > 0;
-  });
-  p.erase(std::unique(p.begin(), p.end(), [&](const Point& a, const Point& b) { return upper(a) == upper(b) && cross(centre, a, b) == 0; }), p.end());
+  std::sort(p.begin(), p.end(),
+            [&](const Point& a, const Point& b) { return upper(a) != upper(b) ? upper(a) : cross(centre, a, b) > 0; });
+  p.erase(std::unique(p.begin(), p.end(),
+                      [&](const Point& a, const Point& b) { return upper(a) == upper(b) && cross(centre, a, b) == 0; }),
+          p.end());
   for (std::size_t k = 0; k < p.size(); ++k) {
     if (p.size() < 3 || cross(centre, p[k], p[(k + 1) % p.size()]) <= 0) return {};
   }
@@ -127,10 +134,14 @@ Curve2 drawn(std::mt19937& random, const Vector2d& a, const Vector2d& b) {
   const auto at = [&](double s) { return Vector2d(a + s * (b - a)); };
   const double s = 0.25 * static_cast<double>(random() % 5);
   switch (random() % 4) {
-    case 0: return line_segment<2>(a, b);
-    case 1: return bezier_curve({a, at(s), b});
-    case 2: return bezier_curve({a, at(s), b}, {1, 0.3 + static_cast<double>(random() % 7), 2.5});
-    default: return bezier_curve({a, at(s / 2), at(0.5 + s / 2), b});
+    case 0:
+      return line_segment<2>(a, b);
+    case 1:
+      return bezier_curve({a, at(s), b});
+    case 2:
+      return bezier_curve({a, at(s), b}, {1, 0.3 + static_cast<double>(random() % 7), 2.5});
+    default:
+      return bezier_curve({a, at(s / 2), at(0.5 + s / 2), b});
   }
 }
 

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-
 #include <cmath>
 #include <map>
 #include <set>
@@ -197,9 +196,10 @@ inline void expect_laws(const TrimmedSurface& surface, const TrimTopology& topol
     if (e.line_v >= 0) {
       EXPECT_EQ(e.uv.y(), mesh.v[static_cast<std::size_t>(e.line_v)]);
     }
-    const Curve2& curve = surface.loops[static_cast<std::size_t>(e.loop)].curves[static_cast<std::size_t>(e.curve)].curve;
-    const double size = std::max({std::abs(mesh.u.front()), std::abs(mesh.u.back()), std::abs(mesh.v.front()),
-                                  std::abs(mesh.v.back())});
+    const Curve2& curve =
+        surface.loops[static_cast<std::size_t>(e.loop)].curves[static_cast<std::size_t>(e.curve)].curve;
+    const double size = std::max(
+        {std::abs(mesh.u.front()), std::abs(mesh.u.back()), std::abs(mesh.v.front()), std::abs(mesh.v.back())});
     EXPECT_LE((curve(e.t) - e.uv).norm(), 1e-7 * size);  // 1e-7: a touch is as flat as the square root of rounding
   }
 }
@@ -220,12 +220,23 @@ inline Tally tally(const TrimTopology& topology) {
   Tally t;
   for (const TrimEvent& e : topology.events) {
     switch (e.kind) {
-      case PointKind::crossing_u: ++t.crossing_u; break;
-      case PointKind::crossing_v: ++t.crossing_v; break;
-      case PointKind::tangent_u: ++t.tangent_u; break;
-      case PointKind::tangent_v: ++t.tangent_v; break;
-      case PointKind::crossing_uv: ++t.crossing_uv; break;
-      case PointKind::vertex: ADD_FAILURE() << "an event is no inner vertex";
+      case PointKind::crossing_u:
+        ++t.crossing_u;
+        break;
+      case PointKind::crossing_v:
+        ++t.crossing_v;
+        break;
+      case PointKind::tangent_u:
+        ++t.tangent_u;
+        break;
+      case PointKind::tangent_v:
+        ++t.tangent_v;
+        break;
+      case PointKind::crossing_uv:
+        ++t.crossing_uv;
+        break;
+      case PointKind::vertex:
+        ADD_FAILURE() << "an event is no inner vertex";
     }
   }
   for (const CellKind kind : topology.cells) {
@@ -235,7 +246,8 @@ inline Tally tally(const TrimTopology& topology) {
   return t;
 }
 
-// The same trimmed surface moved in its parameter plane by (u, v) -> (a u + b v, c u + d v), entries 0 or +- a power of 2.
+// The same trimmed surface moved in its parameter plane by (u, v) -> (a u + b v, c u + d v), entries 0 or +- a power
+// of 2.
 inline TrimmedSurface moved(const TrimmedSurface& from, const Eigen::Matrix2d& map) {
   const auto lines = [&](int axis) {
     const int source = map(axis, 0) != 0 ? 0 : 1;
