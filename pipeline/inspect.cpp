@@ -117,8 +117,9 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   if (options.select_rows && carries_a_shell(panel.face.surface)) {
     decide_used(panel);
   } else if (options.select_rows) {
-    panel.warnings.push_back(who + ": degree 1 or a kink at these knots: a drape refines it first; which points it takes "
-                                   "shows with --degree 2");
+    panel.warnings.push_back(who +
+                             ": degree 1 or a kink at these knots: a drape refines it first; which points it takes "
+                             "shows with --degree 2");
   }
   return panel;
 }
@@ -146,7 +147,9 @@ double gap_as_read(const InspectedPanel& panel, int loop) {
   return 0;
 }
 
-const char* name(LoopKind kind) { return kind == LoopKind::outer ? "outer" : "hole"; }
+const char* name(LoopKind kind) {
+  return kind == LoopKind::outer ? "outer" : "hole";
+}
 
 double perimeter(const InspectedPanel& panel) {
   double sum = 0;
@@ -166,11 +169,46 @@ Eigen::Vector3d position(const InspectedPanel& panel, double u, double v) {
   return panel.face.metres_per_unit * panel.face.surface(u, v);
 }
 
+// JSON holds UTF-8 only; names in IGES files come in any encoding. What isn't UTF-8 is read as Latin-1.
+std::string utf8(const std::string& text) {
+  const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u; };
+  bool valid = true;
+  for (std::size_t k = 0; k < text.size() && valid;) {
+    const unsigned lead = byte(k);
+    const std::size_t length = lead < 0x80                   ? 1
+                               : lead >= 0xc2 && lead < 0xe0 ? 2
+                               : lead >= 0xe0 && lead < 0xf0 ? 3
+                               : lead >= 0xf0 && lead < 0xf5 ? 4
+                                                             : 0;
+    valid = length > 0;
+    for (std::size_t i = 1; i < length; ++i) valid = valid && (byte(k + i) & 0xc0u) == 0x80u;
+    // Overlong forms, surrogates and numbers beyond the last.
+    const unsigned second = byte(k + 1);
+    if ((lead == 0xe0 && second < 0xa0) || (lead == 0xed && second > 0x9f) || (lead == 0xf0 && second < 0x90) ||
+        (lead == 0xf4 && second > 0x8f)) {
+      valid = false;
+    }
+    k += std::max<std::size_t>(length, 1);
+  }
+  if (valid) return text;
+  std::string out;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const unsigned c = byte(k);
+    if (c < 0x80) {
+      out += static_cast<char>(c);
+    } else {
+      out += static_cast<char>(0xc0u | (c >> 6));
+      out += static_cast<char>(0x80u | (c & 0x3fu));
+    }
+  }
+  return out;
+}
+
 nlohmann::ordered_json panel_json(const InspectedPanel& panel) {
   using Json = nlohmann::ordered_json;
   const NurbsSurface& surface = panel.face.surface;
   const Interval du = surface.u().domain(), dv = surface.v().domain();
-  Json out = {{"name", panel.face.name},
+  Json out = {{"name", utf8(panel.face.name)},
               {"degree", {surface.u().degree(), surface.v().degree()}},
               {"control_points", {surface.count_u(), surface.count_v()}},
               {"rational", surface.rational()},
@@ -213,9 +251,9 @@ std::string panel_text(const InspectedPanel& panel) {
   const double metre = panel.face.metres_per_unit;
   const Interval du = surface.u().domain(), dv = surface.v().domain();
   std::string out = fmt::format("\npanel '{}'\n", panel.face.name);
-  out += fmt::format("  surface     degree {} x {}, {} x {} control points ({} carry cloth), {}\n", surface.u().degree(),
-                     surface.v().degree(), surface.count_u(), surface.count_v(), panel.active_control_points,
-                     surface.rational() ? "rational" : "polynomial");
+  out += fmt::format("  surface     degree {} x {}, {} x {} control points ({} carry cloth), {}\n",
+                     surface.u().degree(), surface.v().degree(), surface.count_u(), surface.count_v(),
+                     panel.active_control_points, surface.rational() ? "rational" : "polynomial");
   out += fmt::format("  domain      u [{}, {}], v [{}, {}]\n", du.min, du.max, dv.min, dv.max);
   out += fmt::format("  area        {:.6g} m2, perimeter {:.6g} m\n", area(panel), perimeter(panel));
   out += fmt::format("  cells       {} inside, {} cut, {} outside\n", count_cells(panel, CellKind::inside),
@@ -288,8 +326,10 @@ nlohmann::ordered_json inspect_json(const Inspection& inspection) {
   for (const auto& [type, count] : inspection.entities) entities[std::to_string(type)] = count;
   nlohmann::ordered_json panels = nlohmann::ordered_json::array();
   for (const InspectedPanel& panel : inspection.panels) panels.push_back(panel_json(panel));
-  return {{"file", inspection.file},         {"unit", inspection.unit},   {"exporter", inspection.exporter},
-          {"warnings", inspection.warnings}, {"entities", std::move(entities)}, {"panels", std::move(panels)}};
+  nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
+  for (const std::string& warning : inspection.warnings) warnings.push_back(utf8(warning));
+  return {{"file", utf8(inspection.file)},   {"unit", utf8(inspection.unit)},   {"exporter", utf8(inspection.exporter)},
+          {"warnings", std::move(warnings)}, {"entities", std::move(entities)}, {"panels", std::move(panels)}};
 }
 
 std::string inspect_text(const Inspection& inspection) {

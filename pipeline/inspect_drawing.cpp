@@ -330,7 +330,7 @@ void draw_addresses(Svg& svg, const Drawn& at) {
   svg.text(foot + 56 * dv + Vector2d(0, 4), 12, "v", "v-label halo");
 }
 
-// The grain, drawn in the emptiest cell near the middle of the material: warp long, weft short.
+// The grain, drawn in a cell of the material near its middle: warp long, weft short.
 void draw_grain(Svg& svg, const Drawn& at) {
   const KnotMesh& mesh = at.panel->topology.mesh;
   Vector2d mean(0, 0), best(0, 0);
@@ -347,19 +347,25 @@ void draw_grain(Svg& svg, const Drawn& at) {
   cells([&](const Vector2d& uv) { mean += at(uv), ++count; });
   if (count == 0) return;
   mean /= count;
-  double nearest = 1e300;
+  const double reach = std::clamp(0.10 * (at.high - at.low).minCoeff() * at.scale, 26.0, 60.0);
+  // Clear of the trims first, near the middle second.
+  double highest = -1e300;
   cells([&](const Vector2d& uv) {
-    const double distance = (at(uv) - mean).norm();
-    if (distance < nearest && contains(at.face(), at.panel->topology, uv)) nearest = distance, best = uv;
+    if (!contains(at.face(), at.panel->topology, uv)) return;
+    double clearance = 1.4 * reach;
+    for (const TrimEvent& event : at.panel->topology.events) {
+      clearance = std::min(clearance, (at(event.uv) - at(uv)).norm());
+    }
+    const double score = clearance - 0.1 * (at(uv) - mean).norm();
+    if (score > highest) highest = score, best = uv;
   });
-  if (nearest == 1e300) return;
+  if (highest == -1e300) return;
   const Interval u = at.face().surface.u().domain(), v = at.face().surface.v().domain();
   const Vector2d centre = at(best);
   const Vector2d weft = (at(best + Vector2d(1e-4 * u.length(), 0)) - centre).stableNormalized();
   // Warp is at right angles to weft in the cloth, on the side of v.
   Vector2d warp(-weft.y(), weft.x());
   if (warp.dot(at(best + Vector2d(0, 1e-4 * v.length())) - centre) < 0) warp = -warp;
-  const double reach = std::clamp(0.10 * (at.high - at.low).minCoeff() * at.scale, 26.0, 60.0);
   draw_arrow(svg, centre - reach * warp, centre + reach * warp, "grain");
   svg.arrow_head(centre - reach * warp, -warp, 8, "grain");
   svg.line(centre - 0.35 * reach * weft, centre + 0.35 * reach * weft, "grain");

@@ -9,6 +9,7 @@
 #include <regex>
 
 #include "geometry/error.h"
+#include "geometry/refine.h"
 #include "io/file.h"
 #include "io/obj.h"
 #include "io/polyline.h"
@@ -94,7 +95,14 @@ int vtk_index(int i, int j, int p, int q) {
 }
 
 TEST(Vtu, RationalBezierCellsAreTheSurfaceAndItsVelocity) {
-  const test::Draped draped(true);
+  // Degrees 3 and 4: from cubic on, the order along each edge matters.
+  test::Draped draped(true);
+  const auto elevated = [](const NurbsSurface& s) {
+    return elevate_degree(elevate_degree(s, Direction::u, 3), Direction::v, 4);
+  };
+  const NurbsSurface velocity = elevated(draped.surface.with_points(draped.panel.velocity));
+  draped.surface = elevated(draped.surface);
+  draped.panel.velocity = velocity.points();
   const std::string bytes = format_vtu(draped.frame()).surface;
   EXPECT_NE(bytes.find("<PointData RationalWeights=\"RationalWeights\">"), std::string::npos);
   EXPECT_NE(bytes.find("<CellData HigherOrderDegrees=\"HigherOrderDegrees\">"), std::string::npos);
@@ -102,13 +110,12 @@ TEST(Vtu, RationalBezierCellsAreTheSurfaceAndItsVelocity) {
   const auto u = draped.surface.u().breaks(), v = draped.surface.v().breaks();
   ASSERT_EQ(vtu.cells, int((u.size() - 1) * (v.size() - 1)));
   ASSERT_EQ(vtu["types"].size(), std::size_t(vtu.cells));
-  const NurbsSurface velocity = draped.surface.with_points(draped.panel.velocity);
   std::size_t first = 0;
   for (std::size_t c = 0; c < std::size_t(vtu.cells); ++c) {
     ASSERT_EQ(vtu["types"][c], 77);
     const int p = int(vtu["HigherOrderDegrees"][3 * c]), q = int(vtu["HigherOrderDegrees"][3 * c + 1]);
-    ASSERT_EQ(p, 2);
-    ASSERT_EQ(q, 2);
+    ASSERT_EQ(p, 3);
+    ASSERT_EQ(q, 4);
     const std::size_t i0 = c % (u.size() - 1), j0 = c / (u.size() - 1);
     for (const auto& [a, b] : {std::pair{0.0, 0.0}, {1.0, 0.0}, {0.3, 1.0}, {0.25, 0.7}, {0.9, 0.45}}) {
       Eigen::Vector3d x = Eigen::Vector3d::Zero(), dx = x;

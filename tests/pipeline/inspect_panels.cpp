@@ -151,6 +151,19 @@ TEST(Inspect, RefusesALoopThatCantBeClosed) {
   EXPECT_THROW(inspect(file), GeometryError);
 }
 
+TEST(Inspect, NamesInAnyEncodingBecomeJson) {
+  PanelFile file = flat_panel(false);
+  file.exporter = "caf\xe9";                 // Latin-1
+  file.panels.front().name = "caf\xc3\xa9";  // UTF-8
+  const auto json = inspect_json(inspect(file));
+  EXPECT_EQ(json.at("exporter"), "caf\xc3\xa9");
+  EXPECT_EQ(json.at("panels").at(0).at("name"), "caf\xc3\xa9");
+  for (const char* broken : {"\xc0\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe2\x82", "\xff"}) {
+    file.exporter = broken;
+    EXPECT_NO_THROW((void)inspect_json(inspect(file)).dump());
+  }
+}
+
 std::size_t count(const std::string& text, const std::string& part) {
   std::size_t n = 0;
   for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size())) ++n;

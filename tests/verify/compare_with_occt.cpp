@@ -78,7 +78,11 @@ int main(int count, char** arguments) {
     return 1;
   }
   const IGESData_GlobalSection& global = reader.IGESModel()->GlobalSection();
-  const double resolution = global.Resolution() * global.UnitValue() * metres_per_unit;
+  // OpenCASCADE reads the model space scale (field 13) and doesn't apply it.
+  const double scale = global.Scale() > 0 ? global.Scale() : 1;
+  // Where the file states no resolution, a nanometre.
+  const double stated = global.Resolution() * global.UnitValue() * metres_per_unit / scale;
+  const double resolution = stated > 0 ? stated : 1e-9;
   reader.TransferRoots();
   std::vector<Face> faces;
   for (int k = 1; k <= reader.NbShapes(); ++k) {
@@ -105,7 +109,9 @@ int main(int count, char** arguments) {
     differs(std::to_string(faces.size()) + " faces for OpenCASCADE, " + std::to_string(panels.size()) + " for us");
   }
   for (std::size_t k = 0; k < std::min(faces.size(), panels.size()); ++k) {
-    const Face& theirs = faces[k];
+    Face theirs = faces[k];
+    theirs.area /= scale * scale;
+    theirs.deviation /= scale;
     const std::string name = panels[k].at("name");
     const int loops = static_cast<int>(panels[k].at("loops").size());
     const double area = panels[k].at("area");
