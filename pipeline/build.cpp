@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "analysis/extension.h"
+#include "analysis/projection/point_rule.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "geometry/refine.h"
@@ -170,6 +171,7 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
   CutQuadrature rule = quadrature(built.face, built.topology);
   if (!(rule.area > 0)) throw GeometryError(who + ": the trim leaves no material");
   built.points = constraint_points(built.face, built.topology);
+  built.extra_points = points_for_degree(built.face, built.topology);
 
   const NurbsSurface rest = placed(built.face.surface, unit, panel.place);
   Extension extension = extend(rest, rule, row_sums(rest, rule, panel.fabric.density));
@@ -181,11 +183,6 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
   if (panel.start) {
     NurbsSurface start = start_surface(file, panel, built.face.surface);
     parts.start = placed(start, unit, panel.place).points();
-  }
-  if (std::max(rest.u().degree(), rest.v().degree()) > 2) {
-    warnings.push_back(who +
-                       ": at degree 3 and above the strain is limited at knot-mesh points only, fewer than there are "
-                       "control points");
   }
   parts.shell = {panel.name, std::move(extension.rest), std::move(rule), panel.fabric, panel.grain};
   return parts;

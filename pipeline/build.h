@@ -25,11 +25,18 @@ struct BuiltPanel {
   TrimmedSurface source;
   TrimmedSurface face;
   TrimTopology topology;
-  std::vector<ConstraintPoint> points;
+  std::vector<ConstraintPoint> points;        // the listed ones
+  std::vector<ConstraintPoint> extra_points;  // at degree 3 and above: of the projection only
   std::vector<LoopRepair> repairs;
   std::vector<bool> carries_cloth;  // per control point
   std::vector<int> extended;        // control points with too little cloth that follow their neighbours
   double extension_deviation = 0;   // m, of the rest surface inside the material
+
+  // What a StrainRow's `point` means: the listed points, then the extra ones.
+  const ConstraintPoint& strain_point(int k) const {
+    const std::size_t i = static_cast<std::size_t>(k);
+    return i < points.size() ? points[i] : extra_points[i - points.size()];
+  }
 };
 
 // Everything of a run that doesn't change with pins being released.

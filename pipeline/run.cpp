@@ -221,7 +221,7 @@ class Loop {
     if (!result_.system->projection || row < 0) return "at a pin";
     const StrainRow& strain = result_.system->projection->rows().strain[static_cast<std::size_t>(row)];
     const BuiltPanel& panel = build_.panels[static_cast<std::size_t>(strain.panel)];
-    const ConstraintPoint& point = panel.points[static_cast<std::size_t>(strain.point)];
+    const ConstraintPoint& point = panel.strain_point(strain.point);
     return fmt::format("in {} at (u, v) = ({:.6g}, {:.6g}) of panel '{}'", strain.warp ? "warp" : "weft", point.u,
                        point.v, panel.name);
   }

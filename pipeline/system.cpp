@@ -181,10 +181,14 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     rows.place.push_back({std::move(c.row), pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
     system->place_pin.push_back(pin);
   }
-  for (const BuiltPanel& panel : build.panels) system->points.push_back(panel.points);
+  for (const BuiltPanel& panel : build.panels) {
+    system->points.push_back(panel.points);
+    system->points.back().insert(system->points.back().end(), panel.extra_points.begin(), panel.extra_points.end());
+  }
   if (scene.strain_limit.on) {
     rows.strain = select_rows(*build.model, *system->map, dynamic.node_mass, system->points, rows.place);
   }
+  for (std::size_t k = 0; k < build.panels.size(); ++k) system->points[k].resize(build.panels[k].points.size());
   system->strain_rows = static_cast<int>(rows.strain.size());
   system->place_rows = static_cast<int>(rows.place.size());
   if (!rows.strain.empty() || !rows.place.empty()) {

@@ -1,0 +1,28 @@
+// Where strain is limited besides the knot mesh at degree 3 and above.
+//
+// At degree p a direction of m spans has m + p control points but m + 1 knot lines: at p = 2 the knot-mesh vertices number
+// one less per direction than the control points, from p = 3 on they leave the border a freedom that nothing limits.
+// (analysis/README.md, "Points at degree 3", has the numbers that chose the rule.)
+#pragma once
+
+#include <vector>
+
+#include "trimming/constraint_points.h"
+
+namespace toile {
+
+enum class PointRule {
+  knot_mesh,  // nothing more: the paper's
+  border,     // as many lines more per direction as control points outnumber knot lines, in the spans whose Greville
+              // abscissae are furthest from knots: on uniform knots at p = 3 the middles of the first and the last span
+  cells,      // the middle of every cell
+  half,       // every half of every span
+};
+
+// Grid points of the rule's lines and the knot lines that lie inside the material, knot vertices left out, u fastest; of
+// kind vertex, since the projection treats them alike, but no part of the list that `toile inspect` shows. Empty where
+// both degrees are at most 2: a direction of degree 2 gets no lines from PointRule::border.
+std::vector<ConstraintPoint> points_for_degree(const TrimmedSurface& surface, const TrimTopology& topology,
+                                               PointRule rule = PointRule::border);
+
+}  // namespace toile
