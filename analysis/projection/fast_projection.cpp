@@ -1,6 +1,7 @@
 #include "analysis/projection/fast_projection.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -48,7 +49,7 @@ struct FastProjection::Impl {
 
   void build(const Eigen::VectorXd& node_mass);
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
-  bool factorise();
+  bool factorise(ProjectionReport& report);
   void correct(Eigen::Ref<Eigen::VectorXd> x);
 };
 
@@ -129,7 +130,7 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
       report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
 }
 
-bool FastProjection::Impl::factorise() {
+bool FastProjection::Impl::factorise(ProjectionReport& report) {
   for (int r = 0; r < strains(); ++r) {
     const double length = std::max(y.col(r).norm(), shortest_tangent);
     scale[r] = gram_diagonal[r] > 0 ? 1 / (std::sqrt(gram_diagonal[r]) * length) : 0;
@@ -153,7 +154,10 @@ bool FastProjection::Impl::factorise() {
   for (int attempt = 0; attempt < 4; ++attempt) {
     for (int i = 0; i < size(); ++i)
       values[pattern.column_start[i]] = 1 + (i < strains() ? strain_softness : place_softness);
-    if (factor->factorise(values)) return true;
+    const auto start = std::chrono::steady_clock::now();
+    const bool positive = factor->factorise(values);
+    report.factor_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (positive) return true;
     strain_softness = std::max(10 * strain_softness, 1e-8);
     place_softness = std::max(10 * place_softness, 1e-10);
   }
@@ -211,7 +215,7 @@ ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t
     waited = excess < least_gain * best ? 0 : waited + 1;
     best = std::min(best, excess);
     if (waited >= patience) break;
-    if (!s.factorise()) break;
+    if (!s.factorise(report)) break;
     s.correct(x);
     ++report.iterations;
   }

@@ -26,6 +26,7 @@ struct ProjectionReport {
   double strain_violation = 0;    // largest |C| at the end
   double place_violation = 0;     // m
   int worst_row = -1;             // strain row with the largest |C|
+  double factor_seconds = 0;      // wall time of the numeric factorisations
 };
 
 //   (1) fixed control points don't move;

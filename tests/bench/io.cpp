@@ -16,7 +16,8 @@ TrimmedSurface face(int number) {
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const double u = knots.greville(i), v = knots.greville(j);
-      points.col(i + n * j) << 700 * u + 3 * number, 500 * v + std::sin(9 * u), 40 * std::sin(5 * u + number) * std::cos(4 * v);
+      points.col(i + n * j) << 700 * u + 3 * number, 500 * v + std::sin(9 * u),
+          40 * std::sin(5 * u + number) * std::cos(4 * v);
     }
   TrimmedSurface out;
   out.surface = NurbsSurface(knots, knots, points);

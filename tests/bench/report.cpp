@@ -1,0 +1,135 @@
+// bench_report SAMPLES BENCHMARKS.json...: the numbers that the project promises, each with its target, what it is
+// measured on and what is excluded. Reads what Google Benchmark wrote (medians), and times whole scenes itself. A
+// target that is missed is printed as such and is no error: machines differ.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "bench/scenes.h"
+#include "geometry/error.h"
+
+namespace {
+
+using namespace toile::bench;
+
+void row(const std::string& what, const std::string& value, const std::string& target, bool met,
+         const std::string& how) {
+  fmt::print("{:<44} {:>16}  {:<22} {:<7} {}\n", what, value, target, target.empty() ? "" : (met ? "met" : "MISSED"),
+             how);
+}
+
+void note(const std::string& what, const std::string& value, const std::string& how) {
+  row(what, value, "", true, how);
+}
+
+// Medians by benchmark name.
+class Medians {
+ public:
+  void read(const std::string& path) {
+    std::ifstream file(path);
+    const auto json = nlohmann::json::parse(file);
+    for (const auto& entry : json.at("benchmarks"))
+      if (entry.value("aggregate_name", "") == "median") entries_[entry.at("run_name")] = entry;
+  }
+  double operator()(const std::string& name, const std::string& field) const {
+    const auto found = entries_.find(name);
+    if (found == entries_.end()) throw std::runtime_error("no benchmark " + name);
+    const auto& entry = found->second;
+    const double value = entry.at(field);
+    if (field != "cpu_time") return value;
+    const std::string unit = entry.at("time_unit");
+    return value * (unit == "ns" ? 1e-9 : unit == "us" ? 1e-6 : unit == "ms" ? 1e-3 : 1);
+  }
+
+ private:
+  std::map<std::string, nlohmann::json> entries_;
+};
+
+void functions(const Medians& median) {
+  for (const int n : {10, 32, 100, 316}) {
+    const double time = median(fmt::format("shell_force/p:2/n:{}", n), "per_point");
+    row(fmt::format("force per quadrature point, p = 2, {0} x {0}", n), fmt::format("{:.4f} us", 1e6 * time),
+        "<= 0.1 us", time <= 1e-7, "1 core; 3 x 3 Gauss points a cell; without building the tables");
+  }
+  for (const int rational : {0, 1}) {
+    const double rate = median(fmt::format("grouped_by_span/p:3/rational:{}", rational), "items_per_second");
+    row(fmt::format("surface points, p = 3{}", rational ? ", rational" : ""), fmt::format("{:.1f} M/s", rate / 1e6),
+        rational ? "" : ">= 5 M/s", rate >= 5e6,
+        "1 core; with 1st and 2nd derivatives; 16 points a span, basis included");
+  }
+  const double read = median("read_100_faces", "cpu_time"), size = median("read_100_faces", "MB");
+  row("IGES of 100 trimmed faces read", fmt::format("{:.3f} s", read), "< 0.3 s", read < 0.3,
+      fmt::format("1 core; {:.1f} MB from memory to panels; without the disk", size));
+  const double points = median("constraint_points_of_a_large_face", "cpu_time");
+  row("constraint points, 200 x 200 spans, 500-span trim", fmt::format("{:.4f} s", points), "< 0.1 s", points < 0.1,
+      fmt::format("1 core; validation, tracing and listing of {} points; without making the face",
+                  median("constraint_points_of_a_large_face", "points")));
+}
+
+void kidnapped(const std::string& samples) {
+  constexpr double frame_target = 2e-3, place_target = 5e-3;
+  const auto costs = kidnapped_by_step(samples, {8, 12, 16, 24, 32, 48, 64, 128, 256, 1024});
+  const std::string how = "1 core; 10 x 10, p = 2, 3 x 3 Gauss points a cell; without building, bound, writing";
+  const DrapeCost* chosen = nullptr;
+  for (const DrapeCost& cost : costs) {
+    note(
+        fmt::format("example 4.1(a), dt = 1/{} s", 30 * cost.steps_per_frame),
+        cost.finished ? fmt::format("{:.2f} ms a frame", 1e3 * cost.per_frame) : "no such step",
+        cost.finished ? fmt::format("free corner {:.2f} mm from that of the smallest step", 1e3 * cost.to_finest) : "");
+    if (!chosen && cost.finished && cost.to_finest <= place_target) chosen = &cost;
+  }
+  if (!chosen) throw std::runtime_error("no step of example 4.1(a) ends");
+  row(fmt::format("  largest step within 5 mm: dt = 1/{} s", 30 * chosen->steps_per_frame),
+      fmt::format("{:.2f} ms a frame", 1e3 * chosen->per_frame), "<= 2 ms at <= 5 mm",
+      chosen->per_frame <= frame_target, how);
+}
+
+void growth(const std::string& samples) {
+  constexpr double linear = 1.1;  // an exponent that still counts as linear, with the caches' steps in it
+  std::vector<double> size, motion, projection, factorisation;
+  for (const int n : {10, 32, 100, 316}) {
+    const StepCost cost = step_cost(samples, n);
+    size.push_back(cost.control_points);
+    motion.push_back(cost.motion);
+    projection.push_back(cost.projection);
+    factorisation.push_back(cost.factorisation);
+    note(fmt::format("one step, {} control points", cost.control_points), fmt::format("{:.4f} ms", 1e3 * cost.motion),
+         fmt::format("without projection; one projection iteration {:.4f} ms and its factorisation {:.4f} ms",
+                     1e3 * cost.projection, 1e3 * cost.factorisation));
+  }
+  const auto grows = [&](const std::string& what, const std::vector<double>& cost, bool judged) {
+    const double power = exponent(size, cost);
+    row("  " + what, fmt::format("n^{:.2f}", power), judged ? "<= n^1.1" : "", power <= linear,
+        "1 core; fitted over 10^2 to 10^5 control points");
+  };
+  grows("step without projection", motion, true);
+  grows("projection without factorisation", projection, true);
+  grows("factorisation", factorisation, false);
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  if (count < 3) {
+    std::fprintf(stderr, "usage: bench_report SAMPLES BENCHMARKS.json...\n");
+    return 2;
+  }
+  try {
+    Medians median;
+    for (int k = 2; k < count; ++k) median.read(arguments[k]);
+    fmt::print("{:<44} {:>16}  {:<22} {:<7} {}\n", "what", "measured", "target", "", "how");
+    functions(median);
+    kidnapped(arguments[1]);
+    growth(arguments[1]);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,90 @@
+#include "bench/scenes.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+
+#include "pipeline/measures.h"
+#include "pipeline/run.h"
+
+namespace toile::bench {
+namespace {
+
+Build kidnapped(const std::filesystem::path& samples, const std::vector<std::string>& settings) {
+  return build(read_scene(samples / "kidnapped_a" / "scene.toml", settings));
+}
+
+}  // namespace
+
+std::vector<DrapeCost> kidnapped_by_step(const std::filesystem::path& samples,
+                                         const std::vector<int>& steps_per_frame) {
+  std::vector<DrapeCost> costs;
+  std::vector<Eigen::Vector3d> corners;
+  for (const int count : steps_per_frame) {
+    DrapeCost cost;
+    cost.steps_per_frame = count;
+    cost.dt = 1.0 / (30 * count);
+    const Build scene = kidnapped(samples, {"solver.dt=" + std::to_string(cost.dt)});
+    const RunResult result = run(scene);
+    cost.finished = result.exit == RunExit::ok && result.redone_steps == 0;
+    cost.per_frame = (result.force_seconds + result.projection_seconds) / (30 * result.time);
+    corners.push_back(measure(scene, *result.system, result.state, result.dt_last).points.at(0));
+    costs.push_back(cost);
+  }
+  for (std::size_t k = 0; k < costs.size(); ++k) costs[k].to_finest = (corners[k] - corners.back()).norm();
+  return costs;
+}
+
+StepCost step_cost(const std::filesystem::path& samples, int per_direction) {
+  constexpr double least_seconds = 0.5;
+  constexpr int least_steps = 5;
+  const std::string n = std::to_string(per_direction);
+  const Build scene = kidnapped(samples, {"panel.0.refine.control_points=[" + n + "," + n + "]"});
+  const auto system = assemble(scene, 0);
+  // Bending bounds the step by h^2; half of what 8 x 8 cells allow.
+  const double dt = 2e-3 * std::pow(8.0 / (per_direction - 2), 2);
+  StepCost cost;
+  cost.control_points = per_direction * per_direction;
+  cost.quadrature_points = scene.model->quadrature_points();
+
+  const Eigen::VectorXd still = Eigen::VectorXd::Zero(scene.start.size());
+  DynamicState state = state_from(*system, scene.start, still, 0);
+  initialise(system->dynamic, state);
+  const DynamicState start = state;
+  double spent = 0, projection = 0, factorisation = 0;
+  int iterations = 0;
+  for (int k = 0; k < least_steps || spent < least_seconds; ++k) {
+    const StepReport report = step(system->dynamic, state, dt);
+    spent += report.projection_seconds;
+    projection += report.projection_seconds - report.projection.factor_seconds;
+    factorisation += report.projection.factor_seconds;
+    iterations += report.projection.iterations;
+  }
+  cost.projection = projection / iterations;
+  cost.factorisation = factorisation / iterations;
+
+  DynamicSystem free = system->dynamic;
+  free.projection = nullptr;
+  state = start;
+  int steps = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  for (spent = 0; steps < least_steps || spent < least_seconds; ++steps) {
+    step(free, state, dt);
+    spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+  cost.motion = spent / steps;
+  return cost;
+}
+
+double exponent(const std::vector<double>& size, const std::vector<double>& cost) {
+  double sx = 0, sy = 0, sxx = 0, sxy = 0;
+  const double n = static_cast<double>(size.size());
+  for (std::size_t k = 0; k < size.size(); ++k) {
+    const double x = std::log(size[k]), y = std::log(cost[k]);
+    sx += x, sy += y, sxx += x * x, sxy += x * y;
+  }
+  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+}
+
+}  // namespace toile::bench

@@ -1,0 +1,33 @@
+// Whole scenes, timed: what no loop over one function can say.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace toile::bench {
+
+// Example 4.1(a) at one step size, one core. `per_frame` is the wall time of force and projection for 1/30 s of motion;
+// building the scene, measuring the step bound and writing are excluded.
+struct DrapeCost {
+  int steps_per_frame = 0;
+  double dt = 0;          // s
+  double per_frame = 0;   // s
+  double to_finest = 0;   // m, free corner at 0.6 s against that of the smallest step
+  bool finished = false;  // false: the run was redone with smaller steps or stopped
+};
+std::vector<DrapeCost> kidnapped_by_step(const std::filesystem::path& samples, const std::vector<int>& steps_per_frame);
+
+// One step of the same cloth on n x n control points, p = 2, 3 x 3 Gauss points a cell, one core.
+struct StepCost {
+  int control_points = 0;
+  std::size_t quadrature_points = 0;
+  double motion = 0;         // s, a step without projection
+  double projection = 0;     // s, one iteration of the projection without the numeric factorisation
+  double factorisation = 0;  // s, of one iteration
+};
+StepCost step_cost(const std::filesystem::path& samples, int per_direction);
+
+// Slope of log(cost) over log(size) by least squares.
+double exponent(const std::vector<double>& size, const std::vector<double>& cost);
+
+}  // namespace toile::bench
