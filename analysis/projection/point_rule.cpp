@@ -6,10 +6,16 @@
 namespace toile {
 namespace {
 
-// Greville abscissae that no knot line stands for, counted by span, then spread evenly over their span. Each knot line in
-// turn takes the nearest one left, measured in spans.
+// Greville abscissae that no knot line stands for, counted by span, then spread evenly over their span. Each knot line
+// in turn takes the nearest one left, measured in spans.
 std::vector<double> border_lines(const KnotVector& knots) {
   const std::vector<double> breaks = knots.breaks();
+  std::vector<double> lines;
+  if (knots.degree() <= 2) {
+    for (std::size_t k = 1; k + 1 < breaks.size(); ++k)
+      if (knots.multiplicity(breaks[k]) >= knots.degree()) lines.push_back(0.5 * (breaks[k - 1] + breaks[k]));
+    return lines;
+  }
   const auto cell_of = [&](double u) {
     return static_cast<std::size_t>(std::upper_bound(breaks.begin() + 1, breaks.end() - 1, u) - breaks.begin() - 1);
   };
@@ -25,10 +31,8 @@ std::vector<double> border_lines(const KnotVector& knots) {
   }
   std::vector<int> extra(breaks.size() - 1, 0);
   for (const double x : left) ++extra[std::min(static_cast<std::size_t>(x), breaks.size() - 2)];
-  std::vector<double> lines;
   for (std::size_t c = 0; c < extra.size(); ++c)
-    for (int k = 1; k <= extra[c]; ++k)
-      lines.push_back(breaks[c] + (breaks[c + 1] - breaks[c]) * k / (extra[c] + 1));
+    for (int k = 1; k <= extra[c]; ++k) lines.push_back(breaks[c] + (breaks[c + 1] - breaks[c]) * k / (extra[c] + 1));
   return lines;
 }
 
@@ -58,10 +62,9 @@ std::vector<ConstraintPoint> points_for_degree(const TrimmedSurface& surface, co
   const KnotVector& u = surface.surface.u();
   const KnotVector& v = surface.surface.v();
   std::vector<ConstraintPoint> points;
-  if (rule == PointRule::knot_mesh || std::max(u.degree(), v.degree()) <= 2) return points;
+  if (rule == PointRule::knot_mesh) return points;
   const auto extra = [&](const KnotVector& knots) {
-    if (rule != PointRule::border) return middles(knots);
-    return knots.degree() > 2 ? border_lines(knots) : std::vector<double>{};
+    return rule == PointRule::border ? border_lines(knots) : middles(knots);
   };
   const std::vector<Line> lines_u = merged(topology.mesh.u, extra(u)), lines_v = merged(topology.mesh.v, extra(v));
   for (const Line& b : lines_v)

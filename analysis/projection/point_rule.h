@@ -1,8 +1,9 @@
-// Where strain is limited besides the knot mesh at degree 3 and above.
+// Where strain is limited besides the knot mesh: at degree 3 and above, and beside C0 knot lines.
 //
-// At degree p a direction of m spans has m + p control points but m + 1 knot lines: at p = 2 the knot-mesh vertices number
-// one less per direction than the control points, from p = 3 on they leave the border a freedom that nothing limits.
-// (analysis/README.md, "Points at degree 3", has the numbers that chose the rule.)
+// At degree p a direction of m spans has m + p control points but m + 1 knot lines: at p = 2 the knot-mesh vertices
+// number one less per direction than the control points, from p = 3 on they leave the border a freedom that nothing
+// limits. At a C0 line each side has a strain of its own, and the vertices see one of them. (analysis/README.md,
+// "Points at degree 3", has the numbers that chose the rule.)
 #pragma once
 
 #include <vector>
@@ -14,14 +15,15 @@ namespace toile {
 enum class PointRule {
   knot_mesh,  // nothing more: the paper's
   border,     // as many lines more per direction as control points outnumber knot lines, in the spans whose Greville
-              // abscissae are furthest from knots: on uniform knots at p = 3 the middles of the first and the last span
-  cells,      // the middle of every cell
-  half,       // every half of every span
+           // abscissae are furthest from knots: on uniform knots at p = 3 the middles of the first and the last span;
+           // at p = 2 the middle of the span before each C0 line
+  cells,  // the middle of every cell
+  half,   // every half of every span
 };
 
-// Grid points of the rule's lines and the knot lines that lie inside the material, knot vertices left out, u fastest; of
-// kind vertex, since the projection treats them alike, but no part of the list that `toile inspect` shows. Empty where
-// both degrees are at most 2: a direction of degree 2 gets no lines from PointRule::border.
+// Grid points of the rule's lines and the knot lines that lie inside the material, knot vertices left out, u fastest;
+// of kind vertex, since the projection treats them alike, but no part of the list that `toile inspect` shows. Smooth
+// panels of degree 2 get none by PointRule::border.
 std::vector<ConstraintPoint> points_for_degree(const TrimmedSurface& surface, const TrimTopology& topology,
                                                PointRule rule = PointRule::border);
 

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "analysis/shell/kink_kernel.h"
 #include "analysis/shell/lanes.h"
 #include "analysis/shell/material_basis.h"
 #include "analysis/shell/point_kernel.h"
@@ -369,6 +370,7 @@ struct ShellModel::Impl {
   std::vector<int> first;  // control point of each panel, and the total
   std::vector<CellGroup> groups;
   std::vector<Pack> tables;
+  std::vector<KinkStrip> kinks;
   Eigen::VectorXd rest, lumped_mass, lumped_drag;
   std::size_t point_count = 0;
 
@@ -483,6 +485,9 @@ ShellModel::ShellModel(std::vector<ShellPanel> panels) : impl_(std::make_unique<
     const Eigen::Matrix3Xd& points = impl_->panels[k].rest.points();
     impl_->rest.segment(3 * impl_->first[k], points.size()) = points.reshaped();
     impl_->add_panel(k);
+    if (!impl_->layouts[k].law.bends()) continue;
+    for (const KinkPoint& point : impl_->panels[k].kinks)
+      impl_->kinks.push_back(make_kink_strip(impl_->panels[k], k, impl_->first[k], point));
   }
 }
 
@@ -525,7 +530,10 @@ ShellEnergy ShellModel::internal_force(const Eigen::Ref<const Eigen::VectorXd>& 
     total.membrane += part.membrane;
     total.bending += part.bending;
   });
-  return {sum(total.membrane), sum(total.bending)};
+  double strips = 0;
+  for (const KinkStrip& strip : impl_->kinks)
+    strips += add_kink_force(strip, impl_->layouts[strip.panel].law, q.data(), force.data());
+  return {sum(total.membrane), sum(total.bending) + strips};
 }
 
 void ShellModel::apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
@@ -535,6 +543,8 @@ void ShellModel::apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const
   impl_->for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
     add_group_tangent(group, layout, kind, table, q.data(), dq.data(), df.data());
   });
+  for (const KinkStrip& strip : impl_->kinks)
+    add_kink_tangent(strip, impl_->layouts[strip.panel].law, q.data(), dq.data(), df.data());
   df = -df;
 }
 
@@ -551,6 +561,19 @@ ShellModel::CellShare ShellModel::stiffest_cell(const Eigen::Ref<const Eigen::Ve
       best = {{group.panel, cell.i, cell.j}, work.membrane[l], work.bending[l]};
     }
   });
+  // A strip counts to the cell after it, all its points there together; they follow each other.
+  for (std::size_t begin = 0, end = 0; begin < impl_->kinks.size(); begin = end) {
+    const KinkStrip& first = impl_->kinks[begin];
+    double work = 0;
+    for (; end < impl_->kinks.size(); ++end) {
+      const KinkStrip& strip = impl_->kinks[end];
+      if (std::tie(strip.panel, strip.cell_i, strip.cell_j) != std::tie(first.panel, first.cell_i, first.cell_j)) break;
+      work += add_kink_tangent(strip, impl_->layouts[strip.panel].law, q.data(), dq.data(), nullptr);
+    }
+    if (!(work > largest)) continue;
+    largest = work;
+    best = {{first.panel, first.cell_i, first.cell_j}, 0, work};
+  }
   return best;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "analysis/fabric/fabric.h"
+#include "analysis/shell/kink_strip.h"
 #include "geometry/nurbs_surface.h"
 #include "trimming/quadrature.h"
 
@@ -24,6 +25,8 @@ struct ShellPanel {
   CutQuadrature quadrature;
   Fabric fabric;
   double grain = 0;  // rad
+  // On C0 knot lines, see kink_points(); without them the cloth bends there for nothing.
+  std::vector<KinkPoint> kinks = {};
 };
 
 struct ShellEnergy {

@@ -9,6 +9,7 @@
 #include "analysis/dynamics/time_step.h"
 #include "analysis/dynamics/verlet.h"
 #include "analysis/projection/select_rows.h"
+#include "geometry/refine.h"
 #include "support/panels.h"
 
 namespace toile {
@@ -37,12 +38,13 @@ Swing swing(const TrimmedSurface& face, PointRule rule) {
   std::vector<std::vector<ConstraintPoint>> points{constraint_points(face, topology)};
   const std::vector<ConstraintPoint> extra = points_for_degree(face, topology, rule);
   points[0].insert(points[0].end(), extra.begin(), extra.end());
-  const ShellModel model({test::make_panel(face.surface)});
+  ShellPanel panel = test::make_panel(face.surface);
+  panel.kinks = kink_points(face, topology);
+  const ShellModel model({panel});
   const Eigen::VectorXd rest = model.rest();
   const std::vector<int> corners{0, face.surface.count_u() - 1};
-  const AffineMap map(AffineMap::identity(model.control_point_count()), corners, [&](std::size_t k, double) {
-    return Eigen::Vector3d(rest.segment<3>(3 * corners[k]));
-  });
+  const AffineMap map(AffineMap::identity(model.control_point_count()), corners,
+                      [&](std::size_t k, double) { return Eigen::Vector3d(rest.segment<3>(3 * corners[k])); });
   DynamicSystem system;
   system.model = &model;
   system.map = &map;
@@ -99,9 +101,19 @@ TEST(PointRule, AsManyLinesAsControlPoints) {
     }
 }
 
-TEST(PointRule, QuadraticPanelsGetNothing) {
+TEST(PointRule, SmoothQuadraticPanelsGetNothing) {
   const TrimmedSurface face = square(2, 5);
-  EXPECT_TRUE(points_for_degree(face, trace_trims(face), PointRule::half).empty());
+  EXPECT_TRUE(points_for_degree(face, trace_trims(face)).empty());
+}
+
+TEST(PointRule, AFoldedQuadraticClothKeepsItsLengthBesideTheFold) {
+  const std::vector<double> fold{0.5};
+  const TrimmedSurface face =
+      untrimmed(insert_knots(insert_knots(square(2, 8).surface, Direction::u, fold), Direction::v, fold));
+  const Swing folded = swing(face, PointRule::border), smooth = swing(square(2, 8), PointRule::border);
+  EXPECT_LT(folded.largest, 0.01);
+  EXPECT_LT((folded.corner - smooth.corner).norm(), 0.020);
+  EXPECT_GT(swing(face, PointRule::knot_mesh).largest, 0.05);
 }
 
 TEST(PointRule, PointsLieInTheMaterial) {

@@ -1,0 +1,48 @@
+#include <algorithm>
+
+#include "analysis/shell/kink_strip.h"
+#include "trimming/gauss.h"
+
+namespace toile {
+namespace {
+
+// How far beside the line its two sides are looked at, of a cell. A trim along the line leaves material on one side.
+constexpr double beside = 1e-6;
+
+}  // namespace
+
+std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopology& topology) {
+  std::vector<KinkPoint> points;
+  for (const Direction d : {Direction::u, Direction::v}) {
+    const bool is_u = d == Direction::u;
+    const KnotVector& knots = surface.surface.knots(d);
+    const std::vector<double>& lines = is_u ? topology.mesh.u : topology.mesh.v;
+    const std::vector<double>& across = is_u ? topology.mesh.v : topology.mesh.u;
+    const GaussRule& rule = gauss_rule(surface.surface.knots(is_u ? Direction::v : Direction::u).degree() + 1);
+    for (std::size_t k = 1; k + 1 < lines.size(); ++k) {
+      if (knots.multiplicity(lines[k]) < knots.degree()) continue;
+      std::vector<double> ends = across;
+      for (const TrimEvent& event : topology.events)
+        if ((is_u ? event.line_u : event.line_v) == static_cast<int>(k)) ends.push_back(event.uv[is_u ? 1 : 0]);
+      std::ranges::sort(ends);
+      const double before = lines[k] - beside * (lines[k] - lines[k - 1]);
+      const double after = lines[k] + beside * (lines[k + 1] - lines[k]);
+      for (std::size_t e = 0; e + 1 < ends.size(); ++e) {
+        const double middle = 0.5 * (ends[e] + ends[e + 1]);
+        if (!(ends[e] < middle && middle < ends[e + 1])) continue;
+        const auto in = [&](double side) {
+          return contains(surface, topology, is_u ? Eigen::Vector2d(side, middle) : Eigen::Vector2d(middle, side));
+        };
+        if (!in(before) || !in(after)) continue;
+        for (int g = 0; g < rule.size(); ++g) {
+          const double half = 0.5 * (ends[e + 1] - ends[e]);
+          const std::size_t at = static_cast<std::size_t>(g);
+          points.push_back({d, lines[k], middle + half * rule.x[at], half * rule.w[at]});
+        }
+      }
+    }
+  }
+  return points;
+}
+
+}  // namespace toile
