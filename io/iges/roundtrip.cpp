@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <optional>
 
 #include "geometry/error.h"
 #include "io/iges.h"
@@ -24,7 +25,8 @@ std::string replayed(const File& file, const Entry& e) {
   bool regular = true;
   for (int i = e.first; i < e.first + e.count; ++i) {
     const auto next = static_cast<std::size_t>(i) + 1;
-    const std::size_t end = next < file.parameter_lines.size() ? file.parameter_lines[next].begin : file.parameters.size();
+    const std::size_t end =
+        next < file.parameter_lines.size() ? file.parameter_lines[next].begin : file.parameters.size();
     regular = regular && end - file.parameter_lines[next - 1].begin == 64;
   }
   if (regular) return std::string(file.record(e));
@@ -50,6 +52,28 @@ std::string rewritten(const File& file, const Entry& e) {
   }
 }
 
+// The section as it was, but for a unit flag and name that don't name one unit: some readers look at the flag alone and
+// take what they don't know for millimetres.
+std::string rewritten(const Global& global, const Delimiters& delimiters) {
+  constexpr std::size_t flag = 14 - 3, name = 15 - 3;  // the standard's numbers begin at 3 here
+  const auto& fields = global.fields;
+  const std::optional<Unit> named = name < fields.size() ? unit_of_name(fields[name]) : std::nullopt;
+  const bool agree = named && named->flag == global.unit_flag && parse_integer(fields[flag]) == global.unit_flag;
+  Record out = Record::global(delimiters);
+  for (std::size_t i = 0; i < std::max(fields.size(), name + 1); ++i) {
+    if (!agree && i == flag) {
+      out.integer(global.unit_flag);
+    } else if (!agree && i == name) {
+      out.string(global.unit);
+    } else if (i < fields.size()) {
+      out.token({fields[i], global.is_text[i]});
+    } else {
+      out.blank();
+    }
+  }
+  return out.finish();
+}
+
 std::string rewritten(const File& file) {
   std::vector<OutRecord> records;
   for (const Entry& e : file.entries) {
@@ -61,13 +85,12 @@ std::string rewritten(const File& file) {
   }
   std::vector<std::string> start;
   for (std::string_view line : file.start) start.push_back(padded(line, 72));
-  Record global = Record::global(file.delimiters);
-  for (std::size_t i = 0; i < file.global.fields.size(); ++i)
-    global.token({file.global.fields[i], file.global.is_text[i]});
-  return assemble(start, global.finish(), records);
+  return assemble(start, rewritten(file.global, file.delimiters), records);
 }
 
-bool same_bits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
+bool same_bits(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
 
 template <class A, class B>
 bool same_bits(const A& a, const B& b) {
@@ -117,7 +140,8 @@ std::string format_iges(const PanelFile& file, IgesMode mode) {
 }
 
 bool RoundtripReport::exact() const {
-  return faces_lost == 0 && entities_lost == 0 && knots_equal && weights_equal && points_equal && parameter_curves_equal;
+  return faces_lost == 0 && entities_lost == 0 && knots_equal && weights_equal && points_equal &&
+         parameter_curves_equal;
 }
 
 RoundtripReport roundtrip(const PanelFile& original, IgesMode mode) {

@@ -81,6 +81,21 @@ TEST(IgesWriting, RewritingMakesRecordsAnew) {
   EXPECT_NE(format_iges(read_corpus("denied_outer"), IgesMode::rewrite).find("144,1,1,0,13;"), std::string::npos);
 }
 
+TEST(IgesWriting, RewritingStatesOneUnit) {
+  for (const std::string& name : test::corpus_names()) {
+    SCOPED_TRACE(name);
+    const PanelFile source = read_corpus(name);
+    const PanelFile back = parse_iges(format_iges(source, IgesMode::rewrite), "back.igs");
+    EXPECT_EQ(back.metres_per_unit, source.metres_per_unit);
+    EXPECT_FALSE(test::has_warning(back, "unit")) << back.warnings[0];
+  }
+  // By name only (flag 3), or two that contradict each other: the flag says it all afterwards.
+  EXPECT_NE(format_iges(read_corpus("unit_by_name"), IgesMode::rewrite).find(",10,2HCM,"), std::string::npos);
+  std::string text = test::corpus_text("unit_by_name");
+  text.replace(text.find("1.,3,2Hcm,"), 10, "1.,2,2Hcm,");
+  EXPECT_NE(format_iges(parse_iges(text, "two.igs"), IgesMode::rewrite).find(",2,2HMM,"), std::string::npos);
+}
+
 TEST(IgesWriting, UnknownRecordsSurviveRewriting) {
   const std::string text = format_iges(read_corpus("unknown_entities"), IgesMode::rewrite);
   EXPECT_NE(text.find("5Ha;b,c;"), std::string::npos);
@@ -93,7 +108,8 @@ TEST(IgesWriting, ADrapedFaceComesBackBitForBit) {
     const PanelFile source = read_corpus(name);
     if (source.metres_per_unit != 0.001) continue;
     std::vector<OutputFace> faces;
-    for (const TrimmedSurface& panel : source.panels) faces.push_back({bent(panel), "draped " + panel.name, 2, {{0.8, 0.2, 0.1}}});
+    for (const TrimmedSurface& panel : source.panels)
+      faces.push_back({bent(panel), "draped " + panel.name, 2, {{0.8, 0.2, 0.1}}});
     const PanelFile back = parse_iges(format_iges(faces, header_of(source)).text, "back.igs");
     EXPECT_TRUE(back.warnings.empty()) << back.warnings[0];
     ASSERT_EQ(back.panels.size(), faces.size());
@@ -126,7 +142,7 @@ TEST(IgesWriting, ModelCurvesFollowTheDeformedSurface) {
         for (int i = 0; i <= 1000; ++i) {
           const double t = c.curve.domain().min + c.curve.domain().length() * i / 1000;
           const Eigen::Vector2d p = c.curve(t);
-          largest = std::max(largest, ((*c.model)(t) - back.surface(p.x(), p.y())).norm());
+          largest = std::max(largest, ((*c.model)(t)-back.surface(p.x(), p.y())).norm());
         }
       }
     EXPECT_LE(largest, 1.1 * output.largest_curve_fit + 1e-12 * size);
