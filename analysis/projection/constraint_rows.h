@@ -23,6 +23,7 @@ struct StrainRow {
   int panel = 0;
   int point = 0;               // in the panel's constraint points
   bool warp = false;
+  bool guard = false;          // redundant at rest: enters softly, see ProjectionOptions::guard_softness
 };
 struct PlaceRow {
   ScalarRow row;

@@ -116,6 +116,7 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
       continue;
     }
     residual[r] = 0.5 * (y.col(r).squaredNorm() - 1);
+    if (rows.strain[r].guard && std::isfinite(residual[r])) continue;
     if (!(std::abs(residual[r]) <= report.strain_violation)) {  // NaN counts as worst
       report.strain_violation = std::abs(residual[r]);
       report.worst_row = r;
@@ -152,8 +153,11 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
   // factor fails without it.
   double strain_softness = options.regularisation, place_softness = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
-    for (int i = 0; i < size(); ++i)
-      values[pattern.column_start[i]] = 1 + (i < strains() ? strain_softness : place_softness);
+    for (int i = 0; i < size(); ++i) {
+      const bool guard = i < strains() && rows.strain[i].guard;
+      values[pattern.column_start[i]] =
+          1 + (guard ? std::max(options.guard_softness, strain_softness) : i < strains() ? strain_softness : place_softness);
+    }
     const auto start = std::chrono::steady_clock::now();
     const bool positive = factor->factorise(values);
     report.factor_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

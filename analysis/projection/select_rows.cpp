@@ -292,8 +292,11 @@ std::vector<StrainRow> select_rows(const ShellModel& model, const AffineMap& map
       point.used = false;
       point.why = free_row[r] || free_row[r + 1] ? "redundant" : "fixed";
     }
-    for (std::size_t k : {r, r + 1})
-      if (remains[k]) out.push_back(all[k]);
+    for (std::size_t k : {r, r + 1}) {
+      if (!remains[k] && !free_row[k]) continue;
+      out.push_back(all[k]);
+      out.back().guard = !remains[k];
+    }
   }
   return out;
 }

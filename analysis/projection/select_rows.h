@@ -14,9 +14,10 @@ struct RowSelectionOptions {
   double merge_distance = 0.05;  // of a cell: points nearer than this to one that comes before are merged with it
 };
 
-// Marks constraint points that the projection can't take: `points[panel][k].used = false`, `why` = "redundant" (depends
-// on rows taken before), "fixed" (touches only fixed control points) or "merged" (too near to another), and returns the
-// strain rows that remain, in the order of the points. A point of which one row remains stays used.
+// Marks constraint points that the projection can't take in full: `points[panel][k].used = false`, `why` = "redundant"
+// (both its rows depend on rows taken before), "fixed" (touches only fixed control points) or "merged" (too near to
+// another), and returns the strain rows in the order of the points. Rows that depend on those taken before come back as
+// guards, which enter the projection softly. A point of which one row is no guard stays used.
 // Inner vertices are all taken; where they depend on each other (an edge between two pins) regularisation has to serve.
 // Crossings follow by pivoted Cholesky of the scaled J M^-1 J^T, the one next whose smallest pivot over all states is
 // largest. The rest state is what limits: a flat cloth has two directions for its rows to act in, a bent one three, and
