@@ -14,7 +14,9 @@ namespace toile {
 
 namespace {
 
-std::string reason() { return std::generic_category().message(errno); }
+std::string reason() {
+  return std::generic_category().message(errno);
+}
 
 struct Descriptor {
   int fd;
@@ -22,6 +24,16 @@ struct Descriptor {
     if (fd >= 0) ::close(fd);
   }
 };
+
+bool write_all(int fd, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -52,13 +64,26 @@ std::string read_file(const std::filesystem::path& path, std::uintmax_t limit) {
   return bytes;
 }
 
-void write_file(const std::filesystem::path& path, std::string_view bytes) {
-  const std::string name = path.string();
+void write_file(const std::filesystem::path& asked, std::string_view bytes) {
+  namespace fs = std::filesystem;
+  const std::string name = asked.string();
   std::error_code error;
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-  std::filesystem::create_directories(folder, error);
+  // A link stays a link: what it leads to is replaced.
+  const bool link = fs::is_symlink(asked, error);
+  error.clear();  // what isn't there yet is no link
+  const fs::path path = link ? fs::weakly_canonical(asked, error) : asked;
+  if (error) throw OutputError(name + ": " + error.message());
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  struct stat there {};
+  if (::stat(asked.c_str(), &there) == 0 && !S_ISREG(there.st_mode)) {
+    if (S_ISDIR(there.st_mode)) throw OutputError(name + ": it is a directory, must be a file");
+    // Devices and pipes take bytes as they come; a rename would put a file in their place.
+    Descriptor device{::open(asked.c_str(), O_WRONLY | O_CLOEXEC)};
+    if (device.fd < 0 || !write_all(device.fd, bytes)) throw OutputError(name + ": " + reason());
+    return;
+  }
+  fs::create_directories(folder, error);
   if (error) throw OutputError(name + ": the folder can't be made: " + error.message());
-  if (std::filesystem::is_directory(path, error)) throw OutputError(name + ": it is a directory, must be a file");
 
   std::string temporary = (folder / ".").string();
   temporary.append(path.filename().string()).append(".XXXXXX");
@@ -69,12 +94,7 @@ void write_file(const std::filesystem::path& path, std::string_view bytes) {
     ::unlink(temporary.c_str());
     return OutputError(name + ": " + why);
   };
-  for (std::size_t written = 0; written < bytes.size();) {
-    const ssize_t n = ::write(file.fd, bytes.data() + written, bytes.size() - written);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw fail();
-    written += static_cast<std::size_t>(n);
-  }
+  if (!write_all(file.fd, bytes)) throw fail();
   // mkstemp gives 0600; a new file gets what the process's mask allows, an old one keeps its mode.
   struct stat old {};
   mode_t mode = 0;

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
+#include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -46,6 +48,32 @@ TEST_F(WholeFile, ReadingRefusesDirectoriesMissingAndOversizedFiles) {
   write_file(folder / "big", std::string(100, 'x'));
   EXPECT_THROW(read_file(folder / "big", 99), InputError);
   EXPECT_EQ(read_file(folder / "big", 100).size(), 100u);
+}
+
+TEST_F(WholeFile, ALinkStaysALink) {
+  write_file(folder / "target", "old");
+  std::filesystem::create_symlink("target", folder / "link");
+  write_file(folder / "link", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(read_file(folder / "target"), "new");
+}
+
+TEST_F(WholeFile, ADeviceOrPipeIsWrittenToNotReplaced) {
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  write_file(pipe, "through");
+  char got[16] = {};
+  EXPECT_EQ(::read(reader, got, sizeof got), 7);
+  ::close(reader);
+  EXPECT_STREQ(got, "through");
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+
+  // Through a link, so that a program that replaces what it is given harms no device of this machine.
+  std::filesystem::create_symlink("/dev/full", folder / "full");
+  if (!std::filesystem::is_character_file("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  EXPECT_THROW(write_file(folder / "full", "new"), OutputError);
 }
 
 TEST_F(WholeFile, AFailedWriteKeepsWhatStoodThere) {
