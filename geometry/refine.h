@@ -100,7 +100,8 @@ struct Refinement {
   double deviation = 0;                             // largest move of the surface, unit of the net
   std::vector<std::pair<Direction, double>> kinks;  // interior knots that stay C0 (multiplicity >= degree)
 };
-// Throws GeometryError for options out of range, and where the totals asked for can't be had on the surface's spans.
+// Throws GeometryError for options out of range, where the totals asked for can't be had on the surface's spans, and
+// above two million control points.
 Refinement refine(const NurbsSurface& surface, const RefineOptions& options);
 
 }  // namespace toile

@@ -18,6 +18,15 @@ constexpr double rounding = 256 * std::numeric_limits<double>::epsilon();
 
 // More spans than this in one direction are a mistake in a unit, not a wish.
 constexpr double most_spans = 1e6;
+// And more control points than this: at a few kB each they fill the memory of a large machine.
+constexpr double most_control_points = 2e6;
+
+void check_size(double count_u, double count_v) {
+  if (count_u * count_v > most_control_points)
+    throw GeometryError("this refinement makes " + text(count_u) + " x " + text(count_v) +
+                        " control points, more than the " + text(most_control_points) +
+                        " possible; ask for fewer or longer spans");
+}
 
 double net_size(const NurbsSurface& surface) {
   return (surface.points().rowwise().maxCoeff() - surface.points().rowwise().minCoeff()).norm();
@@ -278,6 +287,7 @@ Refinement refine(const NurbsSurface& surface, const RefineOptions& options) {
   if (const auto patch = affine_patch(surface, tolerance)) {
     KnotVector u = flat_knots(surface.u(), Direction::u, patch->du.norm(), options);
     KnotVector v = flat_knots(surface.v(), Direction::v, patch->dv.norm(), options);
+    check_size(u.control_point_count(), v.control_point_count());
     // A file that has these knots already keeps its numbers.
     if (u == surface.u() && v == surface.v() && !surface.rational()) {
       result.surface = surface;
@@ -296,6 +306,7 @@ Refinement refine(const NurbsSurface& surface, const RefineOptions& options) {
       result.deviation += smooth_kinks(s, d, tolerance - result.deviation);
     const std::vector<double> u = splitting_knots(s, Direction::u, options);
     const std::vector<double> v = splitting_knots(s, Direction::v, options);
+    check_size(s.count_u() + static_cast<double>(u.size()), s.count_v() + static_cast<double>(v.size()));
     result.surface = insert_knots(insert_knots(s, Direction::u, u), Direction::v, v);
   }
   for (Direction d : {Direction::u, Direction::v}) {

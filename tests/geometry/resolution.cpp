@@ -90,6 +90,14 @@ TEST(AffinePatch, IsNoneWhereTheParametersBend) {
   EXPECT_FALSE(affine_patch(test::cylinder(1, 1), 0.1));
 }
 
+TEST(Refine, RefusesMoreControlPointsThanMemoryHolds) {
+  const NurbsSurface bilinear = rebuild(plane, KnotVector(1, {0, 0, 2, 2}), KnotVector(1, {-1, -1, 1, 1}));
+  for (const NurbsSurface& surface : {bilinear, test::cylinder(1, 1)}) {
+    EXPECT_THROW(refine(surface, {.spans = {{10000, 10000}}}), GeometryError);
+    EXPECT_THROW(refine(surface, {.span = 1e-5}), GeometryError);
+  }
+}
+
 TEST(Refine, GivesAFlatPanelExactlyWhatWasAsked) {
   const NurbsSurface bilinear = rebuild(plane, KnotVector(1, {0, 0, 2, 2}), KnotVector(1, {-1, -1, 1, 1}));
   const Refinement points = refine(bilinear, {.degree = 2, .control_points = {{10, 12}}});
