@@ -1,13 +1,19 @@
 #include "pipeline/cli.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "geometry/error.h"
@@ -16,6 +22,7 @@
 #include "pipeline/console.h"
 #include "pipeline/drape.h"
 #include "pipeline/inspect.h"
+#include "pipeline/json_text.h"
 #include "pipeline/scene.h"
 #include "pipeline/templates.h"
 #include "pipeline/units.h"
@@ -125,7 +132,7 @@ int run_inspect(const InspectArguments& a, const Common& common, Console& consol
     console.note("wrote " + a.svg);
   }
   if (common.json) {
-    fmt::print("{}\n", inspect_json(inspection).dump(1));
+    fmt::print("{}\n", json_text(inspect_json(inspection), 1));
   } else {
     fmt::print("{}", inspect_text(inspection));
   }
@@ -147,7 +154,7 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
                                         {"points_equal", r.points_equal},
                                         {"parameter_curves_equal", r.parameter_curves_equal},
                                         {"differences", r.differences}};
-    fmt::print("{}\n", out.dump(2));
+    fmt::print("{}\n", json_text(out));
   } else {
     fmt::print(
         "{}: {} of {} faces, {} of {} entities kept; knots {}, weights {}, control points {}, parameter curves {}\n",
@@ -200,13 +207,18 @@ int run_presets(const Common& common) {
                  f.bending.b0);
     }
   }
-  if (common.json) fmt::print("{}\n", out.dump(2));
+  if (common.json) fmt::print("{}\n", json_text(out));
   return exit_ok;
 }
 
-}  // namespace
+// A standard stream that the caller closed would be the next file opened, and take what is printed.
+void keep_standard_streams() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) == -1 && ::open("/dev/null", O_RDONLY) < 0) return;
+  }
+}
 
-int run_program(int argc, char** argv) {
+int run_command(int argc, char** argv) {
   CLI::App app{"From garment panel to draped NURBS", "toile"};
   app.set_version_flag("--version", version());
   app.require_subcommand(1);
@@ -300,6 +312,12 @@ int run_program(int argc, char** argv) {
   } catch (const OutputError& error) {
     console.error(error.what());
     return exit_output;
+  } catch (const std::filesystem::filesystem_error& error) {
+    console.error(fmt::format("internal error: {}", error.what()));
+    return exit_internal;
+  } catch (const std::system_error& error) {
+    console.error(fmt::format("standard output: {}", error.code().message()));
+    return exit_output;
   } catch (const std::bad_alloc&) {
     console.error("out of memory");
     return exit_internal;
@@ -308,6 +326,17 @@ int run_program(int argc, char** argv) {
     return exit_internal;
   }
   return exit_internal;
+}
+
+}  // namespace
+
+int run_program(int argc, char** argv) {
+  keep_standard_streams();
+  const int code = run_command(argc, argv);
+  errno = 0;
+  if ((std::fflush(stdout) == 0 && std::ferror(stdout) == 0) || code != exit_ok) return code;
+  Console().error(fmt::format("standard output: {}", errno ? std::strerror(errno) : "not everything was written"));
+  return exit_output;
 }
 
 }  // namespace toile

@@ -14,6 +14,7 @@
 #include "io/file.h"
 #include "pipeline/build.h"
 #include "pipeline/cli.h"
+#include "pipeline/json_text.h"
 #include "pipeline/output.h"
 #include "pipeline/run.h"
 #include "pipeline/version.h"
@@ -29,9 +30,10 @@ double since(Clock::time_point start) {
 volatile std::sig_atomic_t interrupted = 0;
 void on_interrupt(int) {
   interrupted = 1;
+  std::signal(SIGINT, SIG_DFL);
 }
 
-// SIGINT asks the run to finish while this lives.
+// SIGINT asks the run to finish while this lives; a second one ends the program at once.
 class InterruptGuard {
  public:
   InterruptGuard() {
@@ -138,7 +140,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
     console.warning(result.warnings.back());
   }
   const StateMeasures measures = measure(built, *result.system, result.state, result.dt_last);
-  const std::string report = report_json(built, result, measures, since(writing)).dump(2) + "\n";
+  const std::string report = json_text(report_json(built, result, measures, since(writing))) + "\n";
   write_file(directory / "report.json", report);
   log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit),
                      result.steps, result.redone_steps, result.dt_min, result.dt_max, result.wall_seconds);
@@ -197,7 +199,7 @@ int dry_run(Scene scene, bool json, Console& console) {
     out["pin_rows"] = 3 * system->place_rows;
     out["unused_points"] = reasons;
     out["warnings"] = built.warnings;
-    fmt::print("{}\n", out.dump(2));
+    fmt::print("{}\n", json_text(out));
     return exit_ok;
   }
   fmt::print("step       {:.4g} s{}\n", dt, built.scene.dt ? " (as the scene says)" : "");
@@ -226,7 +228,7 @@ int check_scene(Scene scene, bool json, Console& console) {
                                {"constraint_points", panel.points.size()}});
     }
     out["warnings"] = built.warnings;
-    fmt::print("{}\n", out.dump(2));
+    fmt::print("{}\n", json_text(out));
     return exit_ok;
   }
   for (const std::string& warning : built.warnings) console.warning(warning);

@@ -13,6 +13,7 @@
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "pipeline/build.h"
+#include "pipeline/json_text.h"
 #include "pipeline/places.h"
 
 namespace toile {
@@ -167,41 +168,6 @@ std::ptrdiff_t count_cells(const InspectedPanel& panel, CellKind kind) {
 
 Eigen::Vector3d position(const InspectedPanel& panel, double u, double v) {
   return panel.face.metres_per_unit * panel.face.surface(u, v);
-}
-
-// JSON holds UTF-8 only; names in IGES files come in any encoding. What isn't UTF-8 is read as Latin-1.
-std::string utf8(const std::string& text) {
-  const auto byte = [&](std::size_t k) { return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u; };
-  bool valid = true;
-  for (std::size_t k = 0; k < text.size() && valid;) {
-    const unsigned lead = byte(k);
-    const std::size_t length = lead < 0x80                   ? 1
-                               : lead >= 0xc2 && lead < 0xe0 ? 2
-                               : lead >= 0xe0 && lead < 0xf0 ? 3
-                               : lead >= 0xf0 && lead < 0xf5 ? 4
-                                                             : 0;
-    valid = length > 0;
-    for (std::size_t i = 1; i < length; ++i) valid = valid && (byte(k + i) & 0xc0u) == 0x80u;
-    // Overlong forms, surrogates and numbers beyond the last.
-    const unsigned second = byte(k + 1);
-    if ((lead == 0xe0 && second < 0xa0) || (lead == 0xed && second > 0x9f) || (lead == 0xf0 && second < 0x90) ||
-        (lead == 0xf4 && second > 0x8f)) {
-      valid = false;
-    }
-    k += std::max<std::size_t>(length, 1);
-  }
-  if (valid) return text;
-  std::string out;
-  for (std::size_t k = 0; k < text.size(); ++k) {
-    const unsigned c = byte(k);
-    if (c < 0x80) {
-      out += static_cast<char>(c);
-    } else {
-      out += static_cast<char>(0xc0u | (c >> 6));
-      out += static_cast<char>(0x80u | (c & 0x3fu));
-    }
-  }
-  return out;
 }
 
 nlohmann::ordered_json panel_json(const InspectedPanel& panel) {

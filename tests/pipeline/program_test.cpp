@@ -109,6 +109,33 @@ TEST(Program, ExitCodesTellWhatIsWrong) {
   EXPECT_FALSE(std::filesystem::exists(folder / "result")) << "a refused run leaves no file";
 }
 
+TEST(Program, JsonIsValidWhateverANameHolds) {
+  const Small folder("names");
+  test::write_panels(folder / "panel.igs", {test::trimmed_sheet("T\xfcr<&>\"\x01")});
+  for (const char* arguments :
+       {"inspect panel.igs --json", "roundtrip panel.igs --json", "drape panel.igs --pin curve:0,2 --dry-run --json",
+        "drape panel.igs --pin curve:0,2 --until 0.01 -o result --json"}) {
+    const Outcome run = toile(folder, arguments);
+    EXPECT_EQ(run.code, 0) << arguments << "\n" << run.err;
+    EXPECT_TRUE(nlohmann::json::accept(run.out)) << arguments;
+  }
+  const auto report = nlohmann::json::parse(read_file(folder / "result/report.json"));
+  EXPECT_EQ(report["reactions"][0]["panel"], "T\xc3\xbcr<&>\"\x01");
+}
+
+TEST(Program, DataThatCantBePrintedIsExit8) {
+  const Small folder("stdout");
+  const auto run = [&](const std::string& arguments) {
+    const int status = std::system(("cd '" + folder.path().string() + "' && '" TOILE_PROGRAM "' " + arguments).c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  EXPECT_EQ(run("inspect panel.igs --json >&- 2>stderr.txt"), 8);
+  EXPECT_NE(read_file(folder / "stderr.txt").find("standard output"), std::string::npos);
+  if (!std::filesystem::is_character_file("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  EXPECT_EQ(run("inspect panel.igs >/dev/full 2>stderr.txt"), 8);
+  EXPECT_EQ(run("drape scene.toml --dry-run >/dev/full 2>stderr.txt"), 8);
+}
+
 TEST(Program, AnErrorNamesFileLineAndKey) {
   const Small folder("line");
   std::string text = read_file(folder / "scene.toml");
