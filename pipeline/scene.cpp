@@ -401,7 +401,8 @@ ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fab
   const auto file = table.string("file");
   if (!file) table.missing("file", "the IGES file that holds the panel, relative to the scene");
   panel.file = beside(scene, *file);
-  if (!std::filesystem::exists(panel.file)) {
+  std::error_code error;
+  if (!std::filesystem::exists(panel.file, error)) {
     table.fail(*table.raw().get("file"), fmt::format("file '{}' does not exist", panel.file.string()));
   }
   panel.start = table.string("start");
@@ -585,6 +586,26 @@ void read_settings(Table& top, Scene& scene) {
   }
 }
 
+// A release that misses a frame, another release or the end by rounding is meant to be there; the step between them
+// would have no length.
+void snap_releases(Scene& scene) {
+  const double near = 1e-6 * std::min(scene.every, scene.until);
+  std::vector<double> releases;
+  for (ScenePin& pin : scene.pins) {
+    if (!pin.release) continue;
+    double& t = *pin.release;
+    if (t < scene.until + near) {
+      std::vector<double> meant = releases;
+      meant.push_back(std::round(t / scene.every) * scene.every);
+      meant.push_back(scene.until);
+      for (const double m : meant) {
+        if (std::abs(t - m) < near) t = m;
+      }
+    }
+    releases.push_back(t);
+  }
+}
+
 Scene read_tables(toml::table& root, const std::filesystem::path& path, std::span<const std::string> settings) {
   for (const std::string& setting : settings) assign(root, setting);
   Scene scene;
@@ -623,6 +644,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
     scene.tractions.push_back(read_traction(table, scene.panels));
   }
   read_settings(top, scene);
+  snap_releases(scene);
   top.done();
   return scene;
 }

@@ -50,6 +50,7 @@ struct Candidate {
 std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
                               const Eigen::VectorXd& mass) {
   const int n = static_cast<int>(candidates.size());
+  if (n == 0 || mass.size() == 0) return std::vector<bool>(candidates.size(), false);  // no place, or nothing left free
   Eigen::SparseMatrix<double, Eigen::RowMajor> rows(n, map.control_points());
   std::vector<Eigen::Triplet<double>> entries;
   for (int k = 0; k < n; ++k) {

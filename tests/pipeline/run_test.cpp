@@ -210,6 +210,39 @@ TEST(Run, APinMovesWhatItHoldsAndLetsItGo) {
   EXPECT_EQ(result.system->place_rows, 0);
 }
 
+TEST(Run, NothingMovesWithoutLoads) {
+  const Folder folder("no_loads");
+  for (const std::string& pins : {std::string(), corner_pins}) {
+    const Build b = built(folder, test::sheet("cloth"), test::scene_text(pins, "[load]\ngravity = [0, 0, 0]\n"));
+    const RunResult result = run(b);
+    ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+    EXPECT_LT((control_points(*result.system, result.state) - b.start).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
+TEST(Run, ClothThatIsHeldEverywhereStays) {
+  const Folder folder("all_held");
+  const std::string all = "[[pin]]\nat = \"box:[-1, -1, -1],[1, 1, 1]\"\n";
+  for (const std::string& more : {std::string(), std::string("[[pin]]\nat = \"uv:133, 133\"\n")}) {
+    const Build b = built(folder, test::sheet("cloth"), test::scene_text(all + more));
+    const RunResult result = run(b);
+    ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+    EXPECT_EQ(control_points(*result.system, result.state), b.start);
+  }
+}
+
+TEST(Run, AReleaseBesideAFrameIsAtTheFrame) {
+  const Folder folder("release");
+  for (const char* release : {"1e-300", "0.05000000000000001", "0.04999999999999999", "0.0999999999999999"}) {
+    const Build b = built(folder, test::sheet("cloth"),
+                          test::scene_text(std::string("[[pin]]\nat = \"edge:v1\"\nrelease = ") + release + "\n"));
+    const RunResult result = run(b);
+    ASSERT_EQ(result.exit, RunExit::ok) << release << ": " << result.reason;
+    EXPECT_GT(result.dt_min, 0.1 * result.dt_max) << release;
+    EXPECT_TRUE(result.system->map->fixed().empty()) << release;
+  }
+}
+
 TEST(Run, AHopelessStepEndsWithTheReason) {
   const Folder folder("hopeless");
   std::string text = test::scene_text(corner_pins);
