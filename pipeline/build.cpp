@@ -62,7 +62,7 @@ NurbsSurface placed(const NurbsSurface& surface, double metres_per_unit, const P
   return surface.with_points(std::move(points));
 }
 
-void refuse_kinks(const NurbsSurface& surface, const std::string& who) {
+void refuse_tears(const NurbsSurface& surface, const std::string& who) {
   for (const Direction d : {Direction::u, Direction::v}) {
     const KnotVector& knots = surface.knots(d);
     const char axis = d == Direction::u ? 'u' : 'v';
@@ -72,11 +72,10 @@ void refuse_kinks(const NurbsSurface& surface, const std::string& who) {
     }
     const std::vector<double> breaks = knots.breaks();
     for (std::size_t k = 1; k + 1 < breaks.size(); ++k) {
-      if (knots.multiplicity(breaks[k]) >= knots.degree()) {
+      if (knots.multiplicity(breaks[k]) > knots.degree()) {
         throw GeometryError(
-            fmt::format("{}: the surface has a kink along the knot line {} = {} (multiplicity {} at degree {}), which "
-                        "the shell can't "
-                        "bend across; smooth it or split the panel there",
+            fmt::format("{}: the surface is torn along the knot line {} = {} (multiplicity {} at degree {}); split the "
+                        "panel there",
                         who, axis, breaks[k], knots.multiplicity(breaks[k]), knots.degree()));
       }
     }
@@ -106,7 +105,7 @@ NurbsSurface refined(const TrimmedSurface& source, const ScenePanel& panel, cons
     }
     surface = std::move(refinement.surface);
   }
-  refuse_kinks(surface, who);
+  refuse_tears(surface, who);
   return surface;
 }
 
@@ -184,7 +183,8 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
     NurbsSurface start = start_surface(file, panel, built.face.surface);
     parts.start = placed(start, unit, panel.place).points();
   }
-  parts.shell = {panel.name, std::move(extension.rest), std::move(rule), panel.fabric, panel.grain};
+  parts.shell = {panel.name,   std::move(extension.rest), std::move(rule),
+                 panel.fabric, panel.grain,               kink_points(built.face, built.topology)};
   return parts;
 }
 

@@ -14,11 +14,12 @@ namespace toile {
 
 enum class PointRule {
   knot_mesh,  // nothing more: the paper's
-  border,     // as many lines more per direction as control points outnumber knot lines, in the spans whose Greville
-           // abscissae are furthest from knots: on uniform knots at p = 3 the middles of the first and the last span;
-           // at p = 2 the middle of the span before each C0 line
-  cells,  // the middle of every cell
-  half,   // every half of every span
+  cells,      // the middle of every cell
+  half,       // every half of every span
+  // As many lines more per direction as control points outnumber knot lines, in the spans whose Greville abscissae are
+  // furthest from knots: on uniform knots at p = 3 the middles of the first and the last span. At p = 2 the middle of
+  // the span before each C0 line.
+  border,
 };
 
 // Grid points of the rule's lines and the knot lines that lie inside the material, knot vertices left out, u fastest;

@@ -287,21 +287,5 @@ TEST(Run, StoppingLeavesAWholeResult) {
   EXPECT_GT(result.time, 0);
 }
 
-TEST(Build, AKinkIsNamedByItsKnot) {
-  TrimmedSurface face = test::sheet("cloth");
-  const NurbsSurface& flat = face.surface;
-  const NurbsSurface doubled = insert_knots(flat, Direction::u, std::vector<double>{160});
-  Eigen::Matrix3Xd net = doubled.points();
-  for (auto point : net.colwise()) point.z() = std::abs(point.x() - 160);
-  face.surface = doubled.with_points(net);
-  const Folder folder("kink");
-  try {
-    built(folder, face, test::scene_text(corner_pins));
-    FAIL() << "a kinked panel was accepted";
-  } catch (const GeometryError& error) {
-    EXPECT_NE(std::string(error.what()).find("u = 160"), std::string::npos) << error.what();
-  }
-}
-
 }  // namespace
 }  // namespace toile
