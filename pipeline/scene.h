@@ -66,7 +66,7 @@ struct SceneTraction {
 struct StrainLimit {
   bool on = false;
   double tolerance = 0.01;
-  double regularisation = 1e-4;
+  double regularisation = 1e-3;  // the default of ProjectionOptions
   int max_iterations = 50;
 };
 
