@@ -20,7 +20,7 @@ using namespace toile::bench;
 
 void row(const std::string& what, const std::string& value, const std::string& target, bool met,
          const std::string& how) {
-  fmt::print("{:<44} {:>16}  {:<22} {:<7} {}\n", what, value, target, target.empty() ? "" : (met ? "met" : "MISSED"),
+  fmt::print("{:<50} {:>16}  {:<22} {:<7} {}\n", what, value, target, target.empty() ? "" : (met ? "met" : "MISSED"),
              how);
 }
 
@@ -123,7 +123,7 @@ int main(int count, char** arguments) {
   try {
     Medians median;
     for (int k = 2; k < count; ++k) median.read(arguments[k]);
-    fmt::print("{:<44} {:>16}  {:<22} {:<7} {}\n", "what", "measured", "target", "", "how");
+    fmt::print("{:<50} {:>16}  {:<22} {:<7} {}\n", "what", "measured", "target", "", "how");
     functions(median);
     kidnapped(arguments[1]);
     growth(arguments[1]);
