@@ -132,7 +132,8 @@ PanelMeasure measure(const TrimmedSurface& surface, const TrimTopology& topology
       for (const TrimEvent& event : topology.events)
         if (event.loop == l && event.curve == k) breaks.push_back(event.t);
       std::sort(breaks.begin(), breaks.end());
-      double scale = 0;
+      // A curve along a pole has no length: rounding of the places is what its integrals may differ by.
+      double scale = 1e-3 * surface.surface.points().cwiseAbs().maxCoeff();
       for (std::size_t s = 0; s + 1 < breaks.size(); ++s)
         scale += gauss_length(surface.surface, curve, breaks[s], breaks[s + 1]);
       for (std::size_t s = 0; s + 1 < breaks.size(); ++s)

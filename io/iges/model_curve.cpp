@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace toile::iges {
@@ -159,6 +160,9 @@ ModelCurve fit_model_curve(const NurbsSurface& surface, const Curve2& c, double 
     map << patch->du, patch->dv;
     out.curve = Curve3(c.knots(), Curve3::Points((map * c.points()).colwise() + patch->origin), c.weights());
   } else {
+    // Far from the origin the places themselves are no finer.
+    const double rounding = 64 * std::numeric_limits<double>::epsilon() * surface.points().cwiseAbs().maxCoeff();
+    tolerance = std::max(tolerance, rounding);
     std::vector<Span> spans;
     for (const BezierCurve<2>& bezier : bezier_pieces(c)) {
       const auto degree = static_cast<int>(bezier.points.cols()) - 1;
