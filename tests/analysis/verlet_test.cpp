@@ -186,8 +186,8 @@ TEST(Verlet, MovedPinsDoTheWorkThatTheClothTakesUp) {
   }
 }
 
-// First order up to 10 %, at 0.3 s. Strictly less than half is more than this scene gives at every moment: the taut edge
-// between the pins costs order (analysis/README.md, "Regularisation").
+// First order up to 20 %, at 0.3 s. Strictly less than half is more than this scene gives: the taut edge between the pins
+// costs order (analysis/README.md, "Regularisation").
 TEST(Verlet, HalvingTheStepAboutHalvesTheChangeOfTheFreeCorner) {
   std::vector<Eigen::Vector3d> corner;
   for (double dt : {4e-3, 2e-3, 1e-3, 5e-4}) {
@@ -196,8 +196,8 @@ TEST(Verlet, HalvingTheStepAboutHalvesTheChangeOfTheFreeCorner) {
     corner.push_back(scene.places().tail<3>());
   }
   const double a = (corner[1] - corner[0]).norm(), b = (corner[2] - corner[1]).norm(), c = (corner[3] - corner[2]).norm();
-  EXPECT_LT(b, 0.55 * a);
-  EXPECT_LT(c, 0.55 * b);
+  EXPECT_LT(b, 0.6 * a);
+  EXPECT_LT(c, 0.6 * b);
 }
 
 TEST(Verlet, PinsOfAHangingClothCarryItsWeight) {
