@@ -18,8 +18,8 @@ struct ProjectionOptions {
   // that limit, at 1e-6 and below by 70 %.
   double regularisation = 1e-3;
   // The same for guard rows: rows that the flat cloth can spare, but that hold the trimmed border of a bent one. Left out,
-  // the border of a hanging square stretches by 20 to 35 %; taken like the others, they lock bending across the net (a
-  // cantilever of 8 elements, turned by 30 degrees, sinks by 28 % too little); at 0.01 the strain stays below 0.5 % and
+  // the border of a hanging square stretches by 6 to 18 %; taken like the others, they lock bending across the net (a
+  // cantilever of 8 elements, turned by 30 degrees, sinks by 28 % too little); at 0.01 the strain stays near 0.1 % and
   // 16 elements sink within 2 % (analysis/README.md, "Which rows").
   double guard_softness = 0.01;
   int min_iterations = 1;         // projecting at least once a step is smooth in dt
