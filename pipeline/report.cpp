@@ -67,7 +67,8 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"p999_warp", m.strain.p999[1]},
                       {"mean_abs_weft", m.strain.mean_abs[0]},
                       {"mean_abs_warp", m.strain.mean_abs[1]},
-                      {"at_constraints_max", m.at_constraints_max}};
+                      {"at_constraints_max", m.at_constraints_max},
+                      {"at_guards_max", m.at_guards_max}};
   report["points"] = Json::array();
   for (std::size_t k = 0; k < m.points.size(); ++k) {
     report["points"].push_back(
