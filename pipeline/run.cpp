@@ -138,6 +138,7 @@ class Loop {
         fail(fmt::format("{}, even with a step of {:.3g} s", trouble, dt));
         return;
       }
+      settle();
       dt /= 2;
       dt_scale_ /= 2;
     }
@@ -146,6 +147,18 @@ class Loop {
       result_.exit = RunExit::interrupted;
       result_.reason = "interrupted";
     }
+  }
+
+  // Takes what the tolerance left of the constraints' violation out of the places and leaves the velocities alone. A step
+  // turns such a rest into a velocity of rest / dt: without this, the smaller step would only be the wilder one.
+  void settle() {
+    const System& system = *result_.system;
+    if (!system.projection) return;
+    constexpr int rounds = 10;
+    const Eigen::VectorXd before = control_points(system, result_.state);
+    for (int k = 0; k < rounds; ++k) system.projection->project(result_.state.x, result_.state.t);
+    result_.energy.load_work += system.dynamic.loads.force.dot(control_points(system, result_.state) - before);
+    initialise(system.dynamic, result_.state);
   }
 
   // Why a step can't be accepted; empty where it can.
