@@ -13,14 +13,13 @@ namespace toile {
 struct ProjectionOptions {
   double tolerance = 0.01;        // largest |C| of a strain row that counts as met
   double place_tolerance = 1e-9;  // m, of place rows
-  // Added to the unit diagonal of the scaled strain rows. Example 4.1(a) without drag, 0.6 s: the energy never rises above
-  // its start plus work at 1e-3, for steps from 1e-4 s to the stability limit; at 1e-4 by 0.5 % of the work of gravity at
-  // that limit, at 1e-6 and below by 70 %.
+  // Added to the unit diagonal of the scaled strain rows. Example 4.1(a) for 0.6 s: without drag the energy never rises above
+  // its start plus work at 1e-3, at the auto step and at 1, 2 and 4 ms; at 1e-4 it rises by 0.5 % of the work of gravity at
+  // the auto step.
   double regularisation = 1e-3;
   // The same for guard rows: rows that the flat cloth can spare, but that hold the trimmed border of a bent one. Left out,
-  // the border of a hanging square stretches by 6 to 18 %; taken like the others, they lock bending across the net (a
-  // cantilever of 8 elements, turned by 30 degrees, sinks by 28 % too little); at 0.01 the strain stays near 0.1 % and
-  // 16 elements sink within 2 % (analysis/README.md, "Which rows").
+  // the border stretches; taken like the others, they lock bending across the net. Chosen by the table in
+  // analysis/README.md, "Which rows", which also says how it was measured.
   double guard_softness = 0.01;
   int min_iterations = 1;         // projecting at least once a step is smooth in dt
   int max_iterations = 50;

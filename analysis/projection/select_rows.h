@@ -7,8 +7,7 @@
 namespace toile {
 
 struct RowSelectionOptions {
-  // Of rows scaled to unit diagonal: below it a row depends on those already taken. A trimmed strip rolled into a
-  // cylinder meets its rows to 1e-6 in 2 to 3 iterations at 1e-2, 3 to 11 at 1e-3, up to 125 at 1e-6, never with all.
+  // Of rows scaled to unit diagonal: below it a row depends on those already taken and becomes a guard.
   double smallest_pivot = 1e-2;
   int bends = 3;                 // random isometric bends besides the rest state, fixed seed
   double merge_distance = 0.05;  // of a cell: points nearer than this to one that comes before are merged with it
