@@ -183,8 +183,8 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
     NurbsSurface start = start_surface(file, panel, built.face.surface);
     parts.start = placed(start, unit, panel.place).points();
   }
-  parts.shell = {panel.name,   std::move(extension.rest), std::move(rule),
-                 panel.fabric, panel.grain,               kink_points(built.face, built.topology)};
+  parts.shell = {panel.name,  std::move(extension.rest), std::move(rule),
+                 panel.fabric, panel.grain, mean_u_direction(rest), kink_points(built.face, built.topology)};
   return parts;
 }
 
