@@ -67,39 +67,6 @@ int active_control_points(const NurbsSurface& surface, const TrimTopology& topol
   return static_cast<int>(std::ranges::count(active, true));
 }
 
-// Which points the projection takes, with the default fabric and nothing pinned.
-void decide_used(InspectedPanel& panel) {
-  const TrimmedSurface& face = panel.face;
-  const NurbsSurface rest = face.surface.with_points(face.metres_per_unit * face.surface.points());
-  ShellPanel shell{face.name, rest, quadrature(face, panel.topology), Fabric{}, 0};
-  const Eigen::VectorXd row_sums = ShellModel({shell}).lumped_mass();
-  Extension extension = extend(rest, shell.quadrature, row_sums);
-  shell.rest = std::move(extension.rest);
-  const ShellModel model({shell});
-  const AffineMap map(extension.dependence, {}, {});
-  const Eigen::VectorXd floor = mass_floor(shell.rest, shell.fabric.density);
-  Eigen::VectorXd mass = map.reduce_scalar(model.lumped_mass());
-  for (Eigen::Index k = 0; k < mass.size(); ++k) {
-    mass[k] = std::max(mass[k], floor[map.node_control_point()[static_cast<std::size_t>(k)]]);
-  }
-  std::vector<std::vector<ConstraintPoint>> points{panel.points};
-  select_rows(model, map, mass, points, {});
-  panel.points = std::move(points.front());
-}
-
-// Degree 1 and kinks have no second derivatives to strain rows' neighbours: such a face is refined before it is draped.
-bool carries_a_shell(const NurbsSurface& surface) {
-  for (const Direction d : {Direction::u, Direction::v}) {
-    const KnotVector& knots = surface.knots(d);
-    if (knots.degree() < 2) return false;
-    const std::vector<double> breaks = knots.breaks();
-    for (std::size_t k = 1; k + 1 < breaks.size(); ++k) {
-      if (knots.multiplicity(breaks[k]) >= knots.degree()) return false;
-    }
-  }
-  return true;
-}
-
 InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& options) {
   InspectedPanel panel;
   panel.face = source;
@@ -115,13 +82,7 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   panel.points = constraint_points(panel.face, panel.topology);
   panel.measure = measure(panel.face, panel.topology);
   panel.active_control_points = active_control_points(panel.face.surface, panel.topology);
-  if (options.select_rows && carries_a_shell(panel.face.surface)) {
-    decide_used(panel);
-  } else if (options.select_rows) {
-    panel.warnings.push_back(who +
-                             ": degree 1 or a kink at these knots: a drape refines it first; which points it takes "
-                             "shows with --degree 2");
-  }
+  merge_near_points(panel.face.surface, panel.points);
   return panel;
 }
 

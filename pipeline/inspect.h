@@ -22,7 +22,6 @@ struct InspectOptions {
   std::optional<int> degree;
   std::optional<double> span;  // m, largest span length
   std::optional<int> spans;    // per direction
-  bool select_rows = true;     // say which points the projection takes, for the default fabric and no pins
 };
 
 struct InspectedPanel {

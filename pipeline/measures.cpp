@@ -110,8 +110,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
       for (std::size_t a = 0; a < row.row.index.size(); ++a) {
         y += row.row.value[a] * q.segment<3>(3 * row.row.index[a]);
       }
-      double& largest = row.guard ? m.at_guards_max : m.at_constraints_max;
-      largest = std::max(largest, std::abs(0.5 * (y.squaredNorm() - 1)));
+      m.at_constraints_max = std::max(m.at_constraints_max, std::abs(0.5 * (y.squaredNorm() - 1)));
     }
   }
   for (const ShellPanel& panel : model.panels()) {

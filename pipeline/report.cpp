@@ -67,8 +67,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"p999_warp", m.strain.p999[1]},
                       {"mean_abs_weft", m.strain.mean_abs[0]},
                       {"mean_abs_warp", m.strain.mean_abs[1]},
-                      {"at_constraints_max", m.at_constraints_max},
-                      {"at_guards_max", m.at_guards_max}};
+                      {"at_constraints_max", m.at_constraints_max}};
   report["points"] = Json::array();
   for (std::size_t k = 0; k < m.points.size(); ++k) {
     report["points"].push_back(
@@ -84,7 +83,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["stress"]["part"] =
       system.strain_rows > 0 ? "membrane only: what the strain limit carries is not in it" : "whole";
   const EnergyBalance& e = run.energy;
-  report["energy"] = {{"kinetic", e.kinetic},         {"membrane", e.membrane},       {"bending", e.bending},
+  report["energy"] = {{"kinetic", e.kinetic},         {"membrane", e.membrane},       {"bending", e.bending}, {"limit", e.limit},
                       {"gravity", e.gravity},         {"dissipated", e.dissipated()}, {"loads_work", e.load_work},
                       {"motion_work", e.motion_work}, {"injected", e.injected}};
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},

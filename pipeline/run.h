@@ -36,12 +36,14 @@ struct RunHooks {
 };
 
 struct EnergyBalance {
-  double kinetic = 0, membrane = 0, bending = 0;         // J, now
+  double kinetic = 0;                                    // J, in the middle of the last step
+  double membrane = 0, bending = 0, limit = 0;           // J, now; limit: of the strain limits
   double start = 0;                                      // J, kinetic and elastic at the start
   double load_work = 0, drag_work = 0, motion_work = 0;  // J, since the start
   double gravity = 0;                                    // J, potential against the start
   double injected = 0;  // J, largest rise of the balance above the start, 0 where it never rose
-  double now() const { return kinetic + membrane + bending; }
+  double elastic() const { return membrane + bending + limit; }
+  double now() const { return kinetic + elastic(); }
   // What drag and projection took.
   double dissipated() const { return start + load_work + motion_work - now(); }
 };
@@ -64,10 +66,11 @@ struct RunResult {
 };
 
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
-// state, evaluated anew every 100 steps.
+// state, evaluated anew every 100 steps and when the cloth has grown much tauter.
 //   (1) every number of an accepted step is finite;
-//   (2) kinetic + elastic energy less the work of loads, drag and moved pins rises in a step by no more than 5 %
-//       of the energy turned over so far, and in all by no more than 20 %, far less than an unstable step soon does.
+//   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from step
+//       to step by no more than 5 % of the energy turned over so far, and in all by no more than 20 %, far less than an
+//       unstable step soon does.
 //       A step that breaks this is redone with half the step; the planned step is halved ten times at most, then the
 //       run ends as solver_failed at the last accepted state.
 // The step is deterministic: no decision depends on time of day, addresses or thread count.

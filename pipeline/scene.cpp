@@ -539,17 +539,43 @@ std::string scene_name(const std::filesystem::path& path) {
   return folder.empty() ? stem : folder;
 }
 
+// "mode": inextensible resists from the first strain on and stays within the tolerance; band lets cloth strain freely to
+// 90 % of the limits, each direction and sign its own.
 void read_limit(Table table, Scene& scene) {
-  const auto mode = table.choice("mode", {"inextensible", "off"}, {"band"});
-  scene.strain_limit.on = !mode || *mode == "inextensible";
-  table.number(scene.strain_limit.tolerance, "tolerance", dimension::none, Range::positive);
+  constexpr double band_slack = 0.9, band_tolerance = 0.01;  // of the limits
+  StrainLimit& limit = scene.strain_limit;
+  const auto mode = table.choice("mode", {"inextensible", "band", "off"}, {});
+  limit.on = !mode || *mode != "off";
+  const bool band = mode && *mode == "band";
+  table.number(limit.tolerance, "tolerance", dimension::none, Range::positive);
+  limit.weft = limit.warp = {limit.tolerance, limit.tolerance};
+  if (band) {
+    const auto stretch = table.vector<2>("stretch", dimension::none), compress = table.vector<2>("compress", dimension::none);
+    if (!stretch && !compress) throw InputError(table.where() + ": mode = \"band\" needs stretch = [weft, warp], compress = [weft, warp], or both");
+    constexpr double free = 0.5;  // C = -1/2 is a thread of no length
+    for (int k : {0, 1}) {
+      StrainBand& b = k == 0 ? limit.weft : limit.warp;
+      b = {stretch ? (*stretch)[k] : 1e3, compress ? (*compress)[k] : free, band_slack};
+      if (!(b.stretch > 0 && b.compress > 0))
+        throw InputError(table.where() + ": stretch and compress are strains above 0 in weft and warp, such as [0.05, 0.02]");
+    }
+    if (!table.find("tolerance"))
+      limit.tolerance = band_tolerance * std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
+  } else {
+    for (const char* key : {"stretch", "compress"}) table.refuse(key, fmt::format("{} belongs to mode = \"band\"", key));
+  }
+  if (table.find("stiffness")) {
+    double stiffness = 0;
+    table.number(stiffness, "stiffness", dimension::force_per_length, Range::positive);
+    limit.stiffness = stiffness;
+  }
+  if (const auto variant = table.choice("variant", {"second-order", "paper"}, {}))
+    limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::second_order;
+  if (band && limit.variant == ProjectionVariant::paper) throw InputError(table.where() + ": variant = \"paper\" has no bands");
   table.choice("solver", {"fast"}, {"lagrange", "springs"});
   table.choice("points", {"knot-mesh"}, {"gauss-2x2", "gauss-1", "cell-average", "greville"});
-  table.number(scene.strain_limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
-  if (const auto n = table.integer("max_iterations", 1, 10000)) scene.strain_limit.max_iterations = *n;
-  for (const char* key : {"stretch", "compress"}) {
-    table.refuse(key, fmt::format("{} belongs to mode = \"band\", which this version does not support", key));
-  }
+  table.number(limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
+  if (const auto n = table.integer("max_iterations", 1, 10000)) limit.max_iterations = *n;
   table.done();
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "analysis/fabric/fabric.h"
+#include "analysis/projection/fast_projection.h"
 #include "pipeline/addresses.h"
 
 namespace toile {
@@ -66,6 +67,9 @@ struct SceneTraction {
 struct StrainLimit {
   bool on = false;
   double tolerance = 0.01;
+  StrainBand weft = {}, warp = {}; // "inextensible": both tolerance, without slack
+  std::optional<double> stiffness; // N/m of force per strain before the wall; unset: chosen by the loads
+  ProjectionVariant variant = ProjectionVariant::second_order;
   double regularisation = 1e-3;  // the default of ProjectionOptions
   int max_iterations = 50;
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "analysis/projection/select_rows.h"
@@ -92,6 +93,22 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
 }
 
 }  // namespace
+
+double limit_stiffness(const Build& build, int panel) {
+  const Scene& scene = build.scene;
+  const StrainLimit& limit = scene.strain_limit;
+  if (limit.stiffness) return *limit.stiffness;
+  // A strain of a tenth of the limit under the whole panel's weight and the largest traction.
+  constexpr double reserve = 10;
+  const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+  const Eigen::Matrix3Xd& net = shell.rest.points();
+  const double length = (net.rowwise().maxCoeff() - net.rowwise().minCoeff()).norm() / std::numbers::sqrt2;
+  double load = shell.fabric.density * scene.gravity.norm() * length;
+  for (const SceneTraction& traction : scene.tractions) load = std::max(load, traction.force.norm());
+  const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
+  const double own = std::max(shell.fabric.membrane.weft, shell.fabric.membrane.warp);
+  return reserve * std::max({load / narrowest, own, shell.fabric.density});
+}
 
 std::unique_ptr<System> assemble(const Build& build, double t) {
   const Scene& scene = build.scene;
@@ -186,17 +203,25 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     system->points.push_back(panel.points);
     system->points.back().insert(system->points.back().end(), panel.extra_points.begin(), panel.extra_points.end());
   }
-  if (scene.strain_limit.on) {
-    rows.strain = select_rows(*build.model, *system->map, dynamic.node_mass, system->points, rows.place);
+  const StrainLimit& limit = scene.strain_limit;
+  if (limit.on) {
+    const Eigen::VectorXd mass = build.model->lumped_mass().cwiseMax(build.mass_floor);
+    rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
+    if (limit.variant == ProjectionVariant::second_order) {
+      for (StrainRow& row : rows.strain) row.stiffness = limit_stiffness(build, row.panel) * row.area;
+    }
   }
   for (std::size_t k = 0; k < build.panels.size(); ++k) system->points[k].resize(build.panels[k].points.size());
   system->strain_rows = static_cast<int>(rows.strain.size());
   system->place_rows = static_cast<int>(rows.place.size());
   if (!rows.strain.empty() || !rows.place.empty()) {
     ProjectionOptions options;
-    options.tolerance = scene.strain_limit.tolerance;
-    options.regularisation = scene.strain_limit.regularisation;
-    options.max_iterations = scene.strain_limit.max_iterations;
+    options.variant = limit.variant;
+    options.weft = limit.weft;
+    options.warp = limit.warp;
+    options.tolerance = limit.tolerance;
+    options.regularisation = limit.regularisation;
+    options.max_iterations = limit.max_iterations;
     system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
   }
   dynamic.projection = system->projection.get();
