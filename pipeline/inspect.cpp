@@ -9,6 +9,7 @@
 #include <set>
 
 #include "analysis/extension.h"
+#include "analysis/projection/point_rule.h"
 #include "analysis/projection/select_rows.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
@@ -27,7 +28,7 @@ NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) 
   refinement.degree = options.degree;
   if (options.span) refinement.span = *options.span / face.metres_per_unit;
   if (options.spans) refinement.spans = {*options.spans, *options.spans};
-  refinement.tolerance = std::max(face.resolution, 1e-9 * bounding_box(surface).diagonal().norm());
+  refinement.tolerance = same_place(face.resolution, surface);
   try {
     return refine(surface, refinement).surface;
   } catch (const GeometryError& error) {
@@ -70,11 +71,16 @@ int active_control_points(const NurbsSurface& surface, const TrimTopology& topol
 // Which points the projection takes, with the default fabric and nothing pinned.
 void decide_used(InspectedPanel& panel) {
   const TrimmedSurface& face = panel.face;
-  const NurbsSurface rest = face.surface.with_points(face.metres_per_unit * face.surface.points());
+  const Closure closure = find_closure(face.surface, same_place(face.resolution, face.surface));
+  const NurbsSurface surface = close_exactly(face.surface, closure);
+  const NurbsSurface rest = surface.with_points(face.metres_per_unit * surface.points());
+  merge_over_seams(surface, closure, panel.points);
   ShellPanel shell{face.name, rest, quadrature(face, panel.topology), Fabric{}, 0};
   const Eigen::VectorXd row_sums = ShellModel({shell}).lumped_mass();
-  Extension extension = extend(rest, shell.quadrature, row_sums);
+  Extension extension = extend(rest, shell.quadrature, row_sums, {}, seam_leaders(rest, closure));
   shell.rest = std::move(extension.rest);
+  tie_smooth_seams(shell.rest, closure, face.metres_per_unit * same_place(face.resolution, surface),
+                   extension.dependence);
   const ShellModel model({shell});
   const AffineMap map(extension.dependence, {}, {});
   const Eigen::VectorXd floor = mass_floor(shell.rest, shell.fabric.density);
