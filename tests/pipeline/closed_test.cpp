@@ -429,7 +429,8 @@ TEST(Closed, TrimsMayCrossTheSeamAndCutItOpen) {
 TEST(Closed, SmallCutCellsAtTheSeamAreExtendedWithIt) {
   for (const TrimmedSurface& whole : {tube(2), tube(3), drop()}) {
     const double end = whole.surface.u().domain().max;
-    const Build b = built(trimmed(whole, {{0, 1.95}, {0.4 * end, 1.4}, {end, 1.95}, {end, 6}, {0, 6}}), heavy_scene(""));
+    const Build b =
+        built(trimmed(whole, {{0, 1.95}, {0.4 * end, 1.4}, {end, 1.95}, {end, 6}, {0, 6}}), heavy_scene(""));
     const BuiltPanel& panel = b.panels[0];
     ASSERT_TRUE(panel.closure.u);
     const auto on_seam = [&](int k) { return panel.leader[static_cast<std::size_t>(k)] != k; };
