@@ -9,6 +9,7 @@
 #include <set>
 
 #include "analysis/extension.h"
+#include "analysis/projection/point_rule.h"
 #include "analysis/projection/select_rows.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
@@ -27,7 +28,7 @@ NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) 
   refinement.degree = options.degree;
   if (options.span) refinement.span = *options.span / face.metres_per_unit;
   if (options.spans) refinement.spans = {*options.spans, *options.spans};
-  refinement.tolerance = std::max(face.resolution, 1e-9 * bounding_box(surface).diagonal().norm());
+  refinement.tolerance = same_place(face.resolution, surface);
   try {
     return refine(surface, refinement).surface;
   } catch (const GeometryError& error) {
@@ -82,6 +83,8 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   panel.points = constraint_points(panel.face, panel.topology);
   panel.measure = measure(panel.face, panel.topology);
   panel.active_control_points = active_control_points(panel.face.surface, panel.topology);
+  const Closure closure = find_closure(panel.face.surface, same_place(panel.face.resolution, panel.face.surface));
+  merge_over_seams(close_exactly(panel.face.surface, closure), closure, panel.points);
   merge_near_points(panel.face.surface, panel.points);
   return panel;
 }

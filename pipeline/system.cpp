@@ -40,6 +40,17 @@ Eigen::Vector3d apply(const ScalarRow& row, const Eigen::VectorXd& q) {
   return y;
 }
 
+// What is held on one side of a seam is held on the other.
+std::vector<int> on_both_sides(const std::vector<int>& control_points, const std::vector<int>& leader) {
+  std::vector<bool> held(leader.size(), false);
+  for (const int i : control_points) held[static_cast<std::size_t>(leader[static_cast<std::size_t>(i)])] = true;
+  std::vector<int> result;
+  for (std::size_t k = 0; k < leader.size(); ++k) {
+    if (held[static_cast<std::size_t>(leader[k])]) result.push_back(static_cast<int>(k));
+  }
+  return result;
+}
+
 struct Candidate {
   ScalarRow row;
   int pin = 0;
@@ -132,11 +143,25 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     const PanelPlaces places{panel.name, panel.face, panel.topology, build.rest(k), start, panel.carries_cloth};
     const HeldPlace place = held_place(pin.at, pin.clamp, places, who);
     int points = 0;
-    for (const int i : place.control_points) {
-      held.push_back({build.model->first_control_point(k) + i, static_cast<int>(p)});
+    const auto count = [&](int i) {
       mean[p] += start.col(i);
       ++points;
+    };
+    std::vector<int> followers;
+    for (const int i : on_both_sides(place.control_points, panel.leader)) {
+      const bool leads = panel.leader[static_cast<std::size_t>(i)] == i;
+      if (panel.smooth_seams.follows(build.rest(k), i)) {
+        if (leads) followers.push_back(i);
+        continue;
+      }
+      held.push_back({build.model->first_control_point(k) + i, static_cast<int>(p)});
+      if (leads) count(i);  // a seam's place counts once
     }
+    // Fixed by itself a point of a smooth seam would no longer follow its neighbours, and the seam could fold there.
+    for (const int i : followers) {
+      candidates.push_back({{{build.model->first_control_point(k) + i}, {1.0}}, static_cast<int>(p), true});
+    }
+    if (points == 0) std::ranges::for_each(followers, count);
     for (const Eigen::Vector2d& uv : place.points) {
       candidates.push_back({row_at(build, k, uv), static_cast<int>(p), place.every_point});
       mean[p] += apply(candidates.back().row, build.start);
