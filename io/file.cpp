@@ -64,7 +64,7 @@ std::string read_file(const std::filesystem::path& path, std::uintmax_t limit) {
   return bytes;
 }
 
-void write_file(const std::filesystem::path& asked, std::string_view bytes) {
+void write_file(const std::filesystem::path& asked, std::string_view bytes, Flush flush) {
   namespace fs = std::filesystem;
   const std::string name = asked.string();
   std::error_code error;
@@ -105,12 +105,10 @@ void write_file(const std::filesystem::path& asked, std::string_view bytes) {
     ::umask(mask);
     mode = 0666 & ~mask;
   }
-  if (::fchmod(file.fd, mode) != 0 || ::fsync(file.fd) != 0) throw fail();
+  if (::fchmod(file.fd, mode) != 0 || (flush == Flush::yes && ::fsync(file.fd) != 0)) throw fail();
   const int closed = ::close(file.fd);
   file.fd = -1;
   if (closed != 0 || ::rename(temporary.c_str(), path.c_str()) != 0) throw fail();
-  const Descriptor directory{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  if (directory.fd >= 0) ::fsync(directory.fd);  // the name, too; a file system that can't is no failure
 }
 
 }  // namespace toile

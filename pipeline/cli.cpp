@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <new>
@@ -118,6 +119,7 @@ int run_drape(const DrapeArguments& a, const Common& common, Console& console) {
   if (!a.directory.empty()) options.directory = a.directory;
   options.overwrite = common.overwrite;
   options.json = common.json;
+  std::signal(SIGPIPE, SIG_IGN);  // a reader of the messages that goes away doesn't end the run
   return drape(std::move(scene), options, console);
 }
 
@@ -332,6 +334,7 @@ int run_command(int argc, char** argv) {
 
 int run_program(int argc, char** argv) {
   keep_standard_streams();
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of a file's size fails, and is reported, as on a full disk
   const int code = run_command(argc, argv);
   errno = 0;
   if ((std::fflush(stdout) == 0 && std::ferror(stdout) == 0) || code != exit_ok) return code;

@@ -145,6 +145,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit),
                      result.steps, result.redone_steps, result.dt_min, result.dt_max, result.wall_seconds);
   if (!result.reason.empty()) log << result.reason << "\n";
+  if (!log.flush()) throw OutputError((directory / "run.log").string() + ": not everything could be written");
 
   console.note(fmt::format("{}: {:.3g} s in {} frames, {} steps of {:.2g} to {:.2g} s, {:.2f} s of wall time",
                            built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,

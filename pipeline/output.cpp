@@ -149,7 +149,8 @@ FrameWriter::~FrameWriter() = default;
 
 void FrameWriter::write(const RunFrame& frame) {
   if (impl_->iges) {
-    write_file(impl_->frames / fmt::format("frame_{:04}.igs", frame.number), draped_file(impl_->build, frame.q).text);
+    write_file(impl_->frames / fmt::format("frame_{:04}.igs", frame.number), draped_file(impl_->build, frame.q).text,
+               Flush::no);
   }
   if (impl_->sinks.empty()) return;
   const Impl::Shown shown = impl_->show(frame.system, frame.q, &frame.velocity);

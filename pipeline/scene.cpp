@@ -10,6 +10,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <numbers>
@@ -256,6 +257,31 @@ std::vector<std::string> split_path(const std::string& path, const std::string& 
   return parts;
 }
 
+// toml++ bounds how deep values nest, not how many parts a dotted key has, and it frees tables by recursion.
+constexpr int deepest_key = 16;
+void refuse_deep_keys(std::string_view text, const std::string& file) {
+  int line = 1, dots = 0;
+  char quote = 0, previous = 0;
+  for (const char c : text) {
+    if (c == '\n') {
+      ++line;
+      dots = quote = previous = 0;
+    } else if (quote != 0) {
+      if (c == quote && quote != '#') quote = 0;
+    } else if (c == '.' && previous != 0) {
+      if (++dots >= deepest_key)
+        throw InputError(fmt::format("{}:{}: a key has more than {} parts", file, line, deepest_key));
+      previous = 0;
+    } else if (c == '"' || c == '\'' || c == '#') {
+      quote = previous = c;
+    } else if (c != ' ' && c != '\t') {
+      const bool in_key = std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-';
+      previous = in_key ? c : '\0';
+      if (!in_key) dots = 0;
+    }
+  }
+}
+
 void assign(toml::table& root, const std::string& setting) {
   const std::size_t equals = setting.find('=');
   if (equals == std::string::npos) throw InputError(fmt::format("--set {}: expected key=value", setting));
@@ -263,6 +289,8 @@ void assign(toml::table& root, const std::string& setting) {
   while (!key.empty() && key.back() == ' ') key.pop_back();
   const std::vector<std::string> parts = split_path(key, setting);
   const std::string value = setting.substr(equals + 1);
+  if (parts.size() > deepest_key) throw InputError(fmt::format("--set: a key has more than {} parts", deepest_key));
+  refuse_deep_keys(value, "--set");
   toml::table parsed;
   try {
     parsed = toml::parse("x = " + value);
@@ -535,7 +563,8 @@ void read_output(Table table, Scene& scene) {
 std::string scene_name(const std::filesystem::path& path) {
   const std::string stem = path.stem().string();
   if (stem != "scene") return stem;
-  const std::string folder = std::filesystem::absolute(path).lexically_normal().parent_path().filename().string();
+  std::error_code gone;  // the current directory may be
+  const std::string folder = std::filesystem::absolute(path, gone).lexically_normal().parent_path().filename().string();
   return folder.empty() ? stem : folder;
 }
 
@@ -695,6 +724,7 @@ Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vec
 }
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
+  refuse_deep_keys(text, path.string());
   toml::table root;
   try {
     root = toml::parse(text, path.string());

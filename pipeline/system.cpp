@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 
@@ -57,8 +58,9 @@ struct Candidate {
   bool required = false;
 };
 
-// Which candidates are independent of those before them and of the fixed control points: Cholesky of the rows' inertia
-// N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one left.
+// Which candidates are independent of those before them and of the fixed control points: sparse Cholesky of the rows'
+// inertia N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one
+// left.
 std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
                               const Eigen::VectorXd& mass) {
   const int n = static_cast<int>(candidates.size());
@@ -71,17 +73,22 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
   }
   rows.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SparseMatrix<double, Eigen::RowMajor> reduced = rows * map.free_part();
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> scaled = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
-  Eigen::MatrixXd dense = Eigen::MatrixXd(scaled);
-  std::vector<bool> taken(static_cast<std::size_t>(n), false);
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> weighted = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> products =
+      weighted * Eigen::SparseMatrix<double>(weighted.transpose());
+  // Row k of the Gram matrix by column; a place meets few others, and so do the rests that the factorisation leaves.
+  std::vector<std::map<int, double>> gram(candidates.size());
   Eigen::VectorXd left(n);
+  // A row that touches fixed control points only holds nothing new.
+  for (int k = 0; k < n; ++k) left[k] = std::sqrt(products.coeff(k, k)) > 1e-9 / std::sqrt(mass.maxCoeff()) ? 1 : 0;
   for (int k = 0; k < n; ++k) {
-    const double norm = dense.row(k).norm();
-    // A row that touches fixed control points only holds nothing new.
-    left[k] = norm > 1e-9 / std::sqrt(mass.maxCoeff()) ? 1 : 0;
-    if (left[k] > 0) dense.row(k) /= norm;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(products, k); it; ++it) {
+      const int l = static_cast<int>(it.col());
+      if (l == k || left[k] == 0 || left[l] == 0) continue;
+      gram[static_cast<std::size_t>(k)][l] = it.value() / std::sqrt(products.coeff(k, k) * products.coeff(l, l));
+    }
   }
-  // Gram-Schmidt on the rows is the Cholesky factorisation of their Gram matrix.
+  std::vector<bool> taken(candidates.size(), false);
   for (bool required : {true, false}) {
     while (true) {
       int best = -1;
@@ -92,11 +99,14 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
       }
       if (best < 0) break;
       taken[static_cast<std::size_t>(best)] = true;
-      const Eigen::RowVectorXd q = dense.row(best).normalized();
-      for (int k = 0; k < n; ++k) {
-        if (taken[static_cast<std::size_t>(k)] || left[k] == 0) continue;
-        dense.row(k) -= dense.row(k).dot(q) * q;
-        left[k] = dense.row(k).squaredNorm();
+      const std::map<int, double> pivot = std::move(gram[static_cast<std::size_t>(best)]);
+      for (const auto& [k, at_k] : pivot) {
+        auto& row = gram[static_cast<std::size_t>(k)];
+        row.erase(best);
+        left[k] -= at_k * at_k / left[best];
+        for (const auto& [l, at_l] : pivot) {
+          if (l != k) row[l] -= at_k * at_l / left[best];
+        }
       }
     }
   }

@@ -213,7 +213,7 @@ class Finder {
   }
 
   bool near_known_contact(const Piece& a, const Piece& b) const {
-    const auto near = [this](const Piece& piece, const Vector2d& x) {
+    const auto near = [](const Piece& piece, const Vector2d& x) {
       return (piece.box.min - x).cwiseAbs().maxCoeff() <= cluster_ &&
              (piece.box.max - x).cwiseAbs().maxCoeff() <= cluster_;
     };

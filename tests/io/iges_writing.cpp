@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <cstdlib>
 
 #include "geometry/error.h"
@@ -148,6 +149,22 @@ TEST(IgesWriting, ModelCurvesFollowTheDeformedSurface) {
     EXPECT_LE(largest, 1.1 * output.largest_curve_fit + 1e-12 * size);
     EXPECT_GE(back.resolution, output.largest_curve_fit);
   }
+}
+
+TEST(IgesWriting, CurvesFarFromTheOriginAreFittedAsFinelyAsPlacesAre) {
+  // 1e9 m away in mm a double is 1e-4 mm fine: a fit that asked for more would halve to the end and write megabytes.
+  const PanelFile source = read_corpus("hole_and_composite");
+  const TrimmedSurface near = bent(source.panels[0]);
+  TrimmedSurface far = near;
+  far.surface = near.surface.with_points(near.surface.points().array() + 1e12);
+  const auto written = [&](const TrimmedSurface& face) {
+    const std::vector<OutputFace> faces{{face, "bent", 0, {}}};
+    return format_iges(faces, header_of(source));
+  };
+  const IgesOutput output = written(far);
+  EXPECT_LE(output.largest_curve_fit, 2 * 64 * std::numeric_limits<double>::epsilon() * 1e12);
+  EXPECT_LT(output.text.size(), 2 * written(near).text.size());
+  EXPECT_EQ(parse_iges(output.text, "far.igs").panels[0].surface, far.surface);
 }
 
 TEST(IgesWriting, OnAFlatPanelModelCurvesAreExact) {

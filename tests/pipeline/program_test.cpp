@@ -146,6 +146,53 @@ TEST(Program, AnErrorNamesFileLineAndKey) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
+TEST(Program, AKeyOfAHundredThousandPartsIsAnError) {
+  const Small folder("deep");
+  std::string key = "a";
+  for (int k = 0; k < 100000; ++k) key += ".a";
+  write_file(folder / "deep.toml", "# 1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1\nb = [0.1, 0.2]\n" + key + " = 1\n");
+  const Outcome run = toile(folder, "check deep.toml");
+  EXPECT_EQ(run.code, 3);
+  EXPECT_EQ(run.err, "error: deep.toml:3: a key has more than 16 parts\n");
+  EXPECT_EQ(toile(folder, "check scene.toml --set " + key.substr(0, 100000) + "=1").code, 3);
+  EXPECT_EQ(toile(folder, "check scene.toml --set 'x={" + key.substr(0, 100001) + "=1}'").code, 3);
+}
+
+TEST(Program, AReaderThatGoesAwayDoesNotEndTheRun) {
+  const Small folder("pipe");
+  const std::string command = "cd '" + folder.path().string() +
+                              "' && { '" TOILE_PROGRAM
+                              "' drape scene.toml -v -o result 2>&1; echo $? >code.txt; } | true";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(read_file(folder / "code.txt"), "0\n");
+  EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "ok");
+}
+
+TEST(Program, ADirectoryThatIsGoneIsNoInternalError) {
+  const Small folder("gone");
+  std::filesystem::create_directory(folder / "inner");
+  const std::string inner = (folder / "inner").string();
+  const int status = std::system(
+      ("cd '" + inner + "' && rmdir '" + inner + "' && '" TOILE_PROGRAM "' check ../scene.toml >/dev/null 2>&1")
+          .c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST(Program, WhenNothingMoreCanBeWrittenItIsExit8AndNoFileIsHalf) {
+  const Small folder("full");
+  const std::string command = "cd '" + folder.path().string() +
+                              "' && ulimit -f 4 && '" TOILE_PROGRAM
+                              "' drape scene.toml -o result --set 'output.formats=[\"vtu\"]' >/dev/null 2>stderr.txt";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 8);
+  EXPECT_NE(read_file(folder / "stderr.txt").find(".vtu: "), std::string::npos);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "result")) {
+    EXPECT_TRUE(entry.is_directory() || entry.path().filename() == "run.log") << entry.path();
+  }
+}
+
 TEST(Program, AUsedDirectoryIsKeptUnlessOverwritten) {
   const Small folder("overwrite");
   write_file(folder / "result/mine.txt", "mine");
