@@ -102,6 +102,29 @@ TEST(TrimQuadrature, PolygonsWithHolesOnGrids) {
                       Rational(exact_moment(outer, a, b) + exact_moment(hole, a, b)).convert_to<double>(), 1e-12);
 }
 
+// Holes that share cells, touch each other in a point off every line, and touch the outline.
+TEST(TrimQuadrature, HolesThatTouchGiveTheirArea) {
+  std::vector<TrimLoop> loops = {polygon_loop({{0, 0}, {4, 0}, {4, 4}, {0, 4}})};
+  double area = 16;
+  const auto add = [&](Vector2d centre, double r) {
+    loops.push_back(backwards(loop_of({round_curve(centre, r)})));
+    area -= pi * r * r;
+  };
+  add({1.25, 1.5}, 0.0625);
+  add({1.375, 1.5}, 0.0625);   // beside the first
+  add({1.3125, 1.75}, 0.125);  // in the same cell
+  add({0.375, 2.5}, 0.375);    // on the outline
+  add({3, 3}, 0.5);            // around a vertex
+  TrimmedSurface face = trimmed(unit_cells(4), loops);
+  int touches = 0;
+  for (const LoopRepair& r : validate_loops(face)) touches += r.what.find("touches") != std::string::npos;
+  EXPECT_EQ(touches, 2);
+  const Panel panel = panel_of(face, quadratic);
+  expect_lawful(panel.rule, 2, [&](double u, double v) { return contains(panel.surface, panel.topology, {u, v}); });
+  expect_near_rel(panel.rule.area, area, 1e-13);
+  EXPECT_EQ(std::count(panel.topology.cells.begin(), panel.topology.cells.end(), CellKind::cut), 6);
+}
+
 TEST(TrimQuadrature, TrimsOnKnotLinesCutNothing) {
   const std::vector<Vector2d> square = {{1, 1}, {4, 1}, {4, 3}, {1, 3}};
   const Panel panel = panel_of(trimmed(unit_cells(5), {polygon_loop(square)}), quadratic);
