@@ -885,6 +885,10 @@ TrimCase random_trim_case(std::uint64_t seed) {
   }
 }
 
+TrimmedSurface surface_of(const TrimCase& given) {
+  return surface_of(given, false);
+}
+
 std::string wrong_decision(const TrimCase& given, std::uint64_t seed) {
   Random random(seed + 1);
   const int nu = static_cast<int>(given.u.size()) - 1, nv = static_cast<int>(given.v.size()) - 1;

@@ -21,6 +21,9 @@ struct TrimCase {
 // The same seed gives the same case.
 TrimCase random_trim_case(std::uint64_t seed);
 
+// Over the identity map (u, v, 0), every piece a curve of its own.
+TrimmedSurface surface_of(const TrimCase& given);
+
 // What the tracer gets wrong of the case, or of the case mirrored, turned, reversed, knot-refined, scaled and shifted;
 // empty where all is right.
 std::string wrong_decision(const TrimCase& given, std::uint64_t seed);
