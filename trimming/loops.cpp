@@ -252,6 +252,10 @@ class Validator {
               : " loop " + std::to_string(b.index) + ", curve " + std::to_string(curve_b.index) + ",";
       if (contact.kind == ContactKind::crossing) fail(a, &curve_a, "crosses" + other, contact.uv);
       if (contact.kind == ContactKind::overlap) fail(a, &curve_a, "runs along" + other, contact.uv);
+      if (contact.loop_a != contact.loop_b) {
+        check_sides(contact.loop_a, contact.loop_b, contact.uv);
+        check_sides(contact.loop_b, contact.loop_a, contact.uv);
+      }
       report(a, "curve " + std::to_string(curve_a.index) + " touches" + other, 0, contact.uv);
     }
   }
@@ -289,6 +293,23 @@ class Validator {
       }
     }
     throw GeometryError(place_name(surface_, loop) + ": encloses nothing");
+  }
+
+  // A loop that only touches `other` has all its span ends, which are exact points of it, on one side or on `other`.
+  // How branches leave a contact is read from rounded points; this is not.
+  void check_sides(int l, int other, const Vector2d& contact) {
+    std::optional<bool> within;
+    for (const TrimSpan& span : spans_.of(l)) {
+      const auto n = winding(other, span.first());
+      if (!n) continue;
+      const bool in = *n != 0;
+      if (within.value_or(in) != in) {
+        const TrimLoop& loop = surface_.loops[static_cast<std::size_t>(l)];
+        fail(loop, &loop.curves[static_cast<std::size_t>(span.curve)],
+             "crosses loop " + std::to_string(surface_.loops[static_cast<std::size_t>(other)].index), contact);
+      }
+      within = in;
+    }
   }
 
   // Side of a loop that doesn't cross `other`: by an end point of its spans that isn't on `other`, else by a point

@@ -48,6 +48,14 @@ class Mesher {
     if (options.size) size_ = *options.size;
     if (!(size_ > 0) || !std::isfinite(size_))
       throw GeometryError(place_name(surface) + ": a triangle size of " + text(size_) + ", must be positive");
+    if (!(options.chord > 0))
+      throw GeometryError(place_name(surface) + ": a chord of " + text(options.chord) + ", must be positive");
+    for (const GivenPoints& g : options.given) {
+      if (g.loop < 0 || g.loop >= static_cast<int>(surface.loops.size()) || g.curve < 0 ||
+          g.curve >= static_cast<int>(surface.loops[static_cast<std::size_t>(g.loop)].curves.size()))
+        throw GeometryError(place_name(surface) + ": points are given for loop " + std::to_string(g.loop) + ", curve " +
+                            std::to_string(g.curve) + ", which isn't there");
+    }
     const double expected = area_ / (size_ * size_ * std::sqrt(3.0) / 4);
     if (!(expected < most_triangles))
       throw GeometryError(place_name(surface) + ": triangles of size " + text(size_) + " would be " + text(expected));
@@ -182,11 +190,13 @@ class Mesher {
         free ? follow(segment, on_curve(l, c, t[i + 1]), 12, ring) : ring.push_back(segment);
       }
     }
-    // A single closed curve needs three sides to enclose anything.
+    // Three sides at least enclose something.
     while (ring.size() < 3) {
       std::vector<Segment> finer;
       for (const Segment& s : ring) halve(s, finer);
-      if (finer.size() == ring.size()) break;
+      if (finer.size() == ring.size())
+        throw GeometryError(place_name(surface_, loop) + ": too few given points: the loop has " +
+                            std::to_string(ring.size()) + " edges");
       ring = finer;
     }
   }
@@ -258,26 +268,20 @@ class Mesher {
     }
     if (!any) return true;
     if (last) {
-      for (auto v = delaunay_.finite_vertices_begin(); v != delaunay_.finite_vertices_end(); ++v) {
-        if (static_cast<std::size_t>(v->info()) < out_.uv.size() &&
-            out_.uv[static_cast<std::size_t>(v->info())] == uv_of(v))
-          continue;
-        if (is_boundary(v, handles)) continue;
+      for (const auto v : delaunay_.finite_vertex_handles()) v->info() = -1;
+      std::size_t k = 0;
+      for (const auto& ring : handles)
+        for (const Delaunay::Vertex_handle v : ring) v->info() = out_.boundary[k++].vertex;
+      for (const auto v : delaunay_.finite_vertex_handles()) {
+        if (v->info() >= 0) continue;
         v->info() = static_cast<int>(out_.uv.size());
-        out_.uv.push_back(uv_of(v));
+        out_.uv.push_back(back_ * Vector2d(v->point().x(), v->point().y()));
       }
       return true;
     }
     divide_crossed(crossed);
     return false;
   }
-
-  static bool is_boundary(Delaunay::Vertex_handle v, const std::vector<std::vector<Delaunay::Vertex_handle>>& handles) {
-    return std::any_of(handles.begin(), handles.end(),
-                       [&](const auto& ring) { return std::find(ring.begin(), ring.end(), v) != ring.end(); });
-  }
-
-  Vector2d uv_of(Delaunay::Vertex_handle v) const { return back_ * Vector2d(v->point().x(), v->point().y()); }
 
   // Halves every crossed segment and all whose boxes meet it.
   void divide_crossed(const std::vector<std::vector<char>>& crossed) {
@@ -390,6 +394,9 @@ class Mesher {
       if (encroaches) continue;
       const Vector2d uv = back_ * Vector2d(x.x(), x.y());
       if (!surface_.surface.u().domain().contains(uv.x()) || !surface_.surface.v().domain().contains(uv.y())) continue;
+      if (!(static_cast<double>(out_.uv.size()) < most_triangles))
+        throw GeometryError(place_name(surface_) + ": triangles of size " + text(size_) + " are more than " +
+                            text(most_triangles));
       const Delaunay::Vertex_handle v = delaunay_.insert(x, type, at, index);
       v->info() = static_cast<int>(out_.uv.size());
       out_.uv.push_back(uv);
@@ -428,6 +435,7 @@ class Mesher {
             std::min(quality.smallest_angle, std::acos(std::clamp((b * b + c * c - a * a) / (2 * b * c), -1.0, 1.0)));
       }
     }
+    if (out_.triangles.empty()) quality = {};
     out_.uv = std::move(used);
     for (BoundaryVertex& b : out_.boundary) b.vertex = number[static_cast<std::size_t>(b.vertex)];
     std::erase_if(out_.boundary, [](const BoundaryVertex& b) { return b.vertex < 0; });

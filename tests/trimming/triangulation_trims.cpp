@@ -154,6 +154,17 @@ TEST(Triangulation, RefusesWhatItCantDo) {
     EXPECT_THROW(triangulate(face, topology, {.size = size, .given = {}}), GeometryError);
   EXPECT_THROW(triangulate(face, topology, {.size = 0.5, .given = {{0, 1, {0.5, 0.25}}}}), GeometryError);
   EXPECT_THROW(triangulate(face, topology, {.size = 0.5, .given = {{0, 1, {1.5}}}}), GeometryError);
+  EXPECT_THROW(triangulate(face, topology, {.size = 0.5, .given = {{0, 4, {0.5}}}}), GeometryError);
+  EXPECT_THROW(triangulate(face, topology, {.size = 0.5, .chord = 0, .given = {}}), GeometryError);
+  const TrimmedSurface lens = trimmed(
+      unit_cells(2), {loop_of({bezier_curve({{0, 1}, {1, 0}, {2, 1}}), bezier_curve({{2, 1}, {1, 2}, {0, 1}})})});
+  EXPECT_THROW(triangulate(lens, trace_trims(lens), {.size = 0.5, .given = {{0, 0, {}}, {0, 1, {}}}}), GeometryError);
+  // Given points so far apart that the chords between them cross the hole.
+  const TrimmedSurface holed =
+      trimmed(unit_cells(2), {loop_of({round_curve({1, 1}, 1)}), backwards(loop_of({round_curve({1, 1}, 0.9)}))});
+  EXPECT_THROW(
+      triangulate(holed, trace_trims(holed), {.size = 0.5, .given = {{0, 0, {1, 2, 3}}, {1, 0, {0.5, 1.5, 2.5, 3.5}}}}),
+      GeometryError);
 }
 
 // A strip between two arches, down to a thousandth of the size.

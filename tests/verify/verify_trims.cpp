@@ -35,9 +35,9 @@ int main(int argc, char** argv) {
       ++families[made.family];
       if (problem.empty()) continue;
       ++wrong;
-      if (wrong <= 20)
-        std::printf("seed %llu: %s\n%s\n", static_cast<unsigned long long>(seed), problem.c_str(),
-                    text_of(made).c_str());
+      if (wrong > 20) continue;
+      std::printf("seed %llu: %s\n%s\n", static_cast<unsigned long long>(seed), problem.c_str(), text_of(made).c_str());
+      std::fflush(stdout);
     }
   };
   std::vector<std::thread> threads;
