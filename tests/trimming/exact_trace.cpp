@@ -275,7 +275,7 @@ std::optional<int> turns(const std::vector<std::vector<Piece>>& loops, const Rat
         if (sign_at(along, end) > 0) bad = true;
       }
       const std::vector<Poly> chain = along.size() > 1 ? sturm_chain(square_free(along)) : std::vector<Poly>{along};
-      const Poly shared = left.empty() || along.empty() ? Poly{1} : common_divisor(left, along);
+      const Poly shared = left.empty() || along.empty() ? Poly{1} : square_free(common_divisor(left, along));
       if (left.empty()) {  // along the ray's line
         if (along.empty() || !roots(along).empty()) return std::nullopt;
         bad = true;
@@ -439,7 +439,6 @@ class Tracer {
  private:
   Code code_at(const Piece& piece, const Place& s) const {
     const Rational w = value(piece.w, s);
-    // Powers of 2^n: numerators of one degree.
     return {code_of(value(piece.x, s) / w, exact_lines_[0]), code_of(value(piece.y, s) / w, exact_lines_[1])};
   }
 

@@ -409,17 +409,14 @@ TrimCase touching_holes(Random& random) {
   // Directions ascending by angle, on a square around the apex.
   std::vector<Vector2d> around;
   const int total = on_outline ? 13 : 24;
-  for (int k = 0; k < total; ++k) {
-    const int side = on_outline ? k : k;
-    const auto at = [&](int i) -> Vector2d {  // 24 places on the square of half size 3, from (3, 0)
-      if (i < 3) return {3, i};
-      if (i < 9) return {6 - i, 3};
-      if (i < 15) return {-3, 12 - i};
-      if (i < 21) return {i - 18, -3};
-      return {3, i - 24};
-    };
-    around.push_back(at(side));
-  }
+  const auto place = [](int i) -> Vector2d {  // 24 places on the square of half size 3, from (3, 0)
+    if (i < 3) return {3, i};
+    if (i < 9) return {6 - i, 3};
+    if (i < 15) return {-3, 12 - i};
+    if (i < 21) return {i - 18, -3};
+    return {3, i - 24};
+  };
+  for (int k = 0; k < total; ++k) around.push_back(place(k));
   const double h = n / 64.0;
   std::size_t k = on_outline ? 1 : 0;
   const std::size_t end = around.size() - (on_outline ? 1 : 0);
