@@ -2,7 +2,7 @@
 #   make demo     build, drape a real panel file, say where the results are
 #   make test     build with warnings as errors, run all tests
 #   make bench    benchmarks: speed as ratios and as cost against size
-#   make verify   read what we write with OpenCASCADE and compare
+#   make verify   read what we write with OpenCASCADE and compare; trace hard trims against exact arithmetic
 #   make format   clang-format on all sources
 #   make install  to PREFIX (default /usr/local)
 PREFIX ?= /usr/local

@@ -158,6 +158,11 @@ nlohmann::ordered_json panel_json(const InspectedPanel& panel) {
                   {"cut", count_cells(panel, CellKind::cut)},
                   {"outside", count_cells(panel, CellKind::outside)}};
   out["active_control_points"] = panel.active_control_points;
+  const PredicateCounts& counts = panel.topology.counts;  // how often each level of arithmetic decided
+  out["predicates"] = {{"signs", counts.coefficient_signs},
+                       {"interval", counts.interval},
+                       {"exact", counts.exact},
+                       {"algebraic", counts.algebraic}};
   out["constraint_points"] = Json::array();
   for (const ConstraintPoint& point : panel.points) {
     const Eigen::Vector3d x = position(panel, point.u, point.v);

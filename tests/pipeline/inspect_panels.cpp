@@ -70,9 +70,9 @@ TEST(Inspect, JsonHasTheFieldsOfTheContract) {
   EXPECT_EQ(keys(json), (std::vector<std::string>{"file", "unit", "exporter", "warnings", "entities", "panels"}));
   EXPECT_EQ(json.at("entities"), (nlohmann::ordered_json{{"128", 1}, {"144", 1}}));
   const auto& panel = json.at("panels").at(0);
-  EXPECT_EQ(keys(panel),
-            (std::vector<std::string>{"name", "degree", "control_points", "rational", "knots", "domain", "area",
-                                      "perimeter", "loops", "cells", "active_control_points", "constraint_points"}));
+  EXPECT_EQ(keys(panel), (std::vector<std::string>{"name", "degree", "control_points", "rational", "knots", "domain",
+                                                   "area", "perimeter", "loops", "cells", "active_control_points",
+                                                   "predicates", "constraint_points"}));
   EXPECT_EQ(panel.at("degree"), (nlohmann::ordered_json{2, 2}));
   EXPECT_EQ(panel.at("control_points"), (nlohmann::ordered_json{7, 7}));
   EXPECT_EQ(panel.at("rational"), false);
