@@ -193,7 +193,8 @@ class CutCellRule {
   std::vector<Monotone> monotone_;
   std::vector<double> heights_, roots_;
   std::vector<Crossing> crossings_;
-  std::vector<double> x_, y_, w_;  // candidates; weights over the area
+  // Candidates; weights over the area. Aligned: Eigen's sums over a map depend on where it lies.
+  std::vector<double, Eigen::aligned_allocator<double>> x_, y_, w_;
   RowMajor phi_;                   // functions x candidates
   RowMajor table_;                 // the same in terms of the basis points
   std::vector<int> basis_;         // candidate of each row, -1: none
