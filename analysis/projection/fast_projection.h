@@ -34,6 +34,12 @@ struct ProjectionReport {
   double factor_seconds = 0;      // wall time of the numeric factorisations
 };
 
+// What the last projection left behind, for reactions: rows and shapes as below.
+struct ProjectionMemory {
+  Eigen::VectorXd strain_multipliers;
+  Eigen::Matrix3Xd place_multipliers, strain_impulses;
+};
+
 //   (1) fixed control points don't move;
 //   (2) linear momentum is kept where nothing is pinned, and every iteration's impulse has no moment about the places
 //       it started from (angular momentum);
@@ -60,6 +66,9 @@ class FastProjection {
   // Multiplier times tangent, summed over the iterations with the tangents of each [kg m]: control point I was pushed by
   // -d_I times its column. What a reaction needs; lambda y at the end differs from it by the move of the last step.
   const Eigen::Matrix3Xd& strain_impulses() const;
+  // All three, and putting them back where a run is taken up again; false where their sizes are of other rows.
+  ProjectionMemory memory() const;
+  bool restore(const ProjectionMemory& memory);
   const ConstraintRows& rows() const;
   const ProjectionOptions& options() const;
   std::size_t factor_nonzeros() const;
