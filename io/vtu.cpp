@@ -407,9 +407,11 @@ void VtuSink::write(const Frame& frame) {
   std::string collection =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<Collection>\n";
-  for (std::size_t k = 0; k < times.size(); ++k)
-    collection += "<DataSet timestep=\"" + number(times[k]) + "\" part=\"0\" file=\"" + escaped(name_) + '_' +
-                  four_digits(static_cast<int>(k)) + ".vtm\"/>\n";
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    const std::string file = name_ + '_' + four_digits(static_cast<int>(k)) + ".vtm";
+    if (!std::filesystem::exists(folder_ / file)) continue;
+    collection += "<DataSet timestep=\"" + number(times[k]) + "\" part=\"0\" file=\"" + escaped(file) + "\"/>\n";
+  }
   write_file(folder_ / (name_ + ".pvd"), collection + "</Collection>\n</VTKFile>\n", Flush::no);
   times_ = std::move(times);
 }

@@ -23,7 +23,8 @@ struct VtuBlocks {
 VtuBlocks format_vtu(const Frame& frame);
 
 // Writes FOLDER/NAME_0000.vtm, its blocks in FOLDER/NAME_0000/, and FOLDER/NAME.pvd, which names all frames with their
-// times and is replaced after each frame. `written`: times of frames that a resumed run already has on disk.
+// times and is replaced after each frame. `written`: times of frames that a resumed run has made before; those that are
+// not in FOLDER stay out of the index.
 class VtuSink : public FrameSink {
  public:
   VtuSink(std::filesystem::path folder, std::string name, std::vector<double> written = {});

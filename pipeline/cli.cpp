@@ -20,6 +20,7 @@
 #include "geometry/error.h"
 #include "io/file.h"
 #include "io/iges.h"
+#include "pipeline/allocation_count.h"
 #include "pipeline/console.h"
 #include "pipeline/drape.h"
 #include "pipeline/inspect.h"
@@ -50,13 +51,15 @@ void add_common(CLI::App& app, Common& common) {
   app.add_flag("--no-progress", common.no_progress, "No progress line");
   app.add_flag("--overwrite", common.overwrite, "Replace files of a former run");
   app.add_option("--color", common.colour, "auto or never")->check(CLI::IsMember({"auto", "never"}));
-  app.add_option("--threads", common.threads, "Threads; this version uses one")->check(CLI::Range(1, 1));
+  app.add_option("--threads", common.threads, "Threads of a drape; any number gives the same bytes")
+      ->check(CLI::Range(1, 64));
 }
 
 struct DrapeArguments {
   std::string input, directory;
   std::vector<std::string> settings, pins;
-  std::string until, fabric, span;
+  std::string until, fabric, span, time_limit;
+  std::optional<std::string> resume;
   int degree = 0;
   bool dry = false;
 };
@@ -82,6 +85,7 @@ Scene scene_of(const DrapeArguments& a) {
     if (s.find('=') == std::string::npos) throw UsageError(fmt::format("--set {}: expected key=value", s));
   }
   if (!a.until.empty()) settings.push_back("solver.until=" + a.until);
+  if (!a.time_limit.empty()) settings.push_back("solver.time_limit=" + a.time_limit);
   const bool scene_file = std::filesystem::path(a.input).extension() == ".toml";
   if (scene_file) {
     if (!a.pins.empty() || !a.fabric.empty() || !a.span.empty() || a.degree > 0) {
@@ -120,6 +124,9 @@ int run_drape(const DrapeArguments& a, const Common& common, Console& console) {
   options.overwrite = common.overwrite;
   options.json = common.json;
   std::signal(SIGPIPE, SIG_IGN);  // a reader of the messages that goes away doesn't end the run
+  options.threads = common.threads;
+  if (allocation_count()) options.allocations = [] { return *allocation_count(); };
+  if (a.resume) options.resume = *a.resume;
   return drape(std::move(scene), options, console);
 }
 
@@ -235,7 +242,12 @@ int run_command(int argc, char** argv) {
       ->take_all()
       ->allow_extra_args(false);
   drape_command->add_option("--until", drape_arguments.until, "Simulated time, s or with a unit");
-  drape_command->add_flag("--dry-run", drape_arguments.dry, "Say step, time and memory; run nothing");
+  auto* dry = drape_command->add_flag("--dry-run", drape_arguments.dry, "Say step, time and memory; run nothing");
+  drape_command
+      ->add_option("--resume", drape_arguments.resume, "Go on from a checkpoint of the same scene (DIR/checkpoint)")
+      ->excludes(dry);
+  drape_command->add_option("--time-limit", drape_arguments.time_limit,
+                            "Wall time after which the run stops and leaves a checkpoint, s or with a unit");
   drape_command->add_option("--pin", drape_arguments.pins, "Panel files: what is held, such as curve:0,2; may repeat")
       ->take_all()
       ->allow_extra_args(false);

@@ -40,7 +40,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["simulated_seconds"] = run.time;
   const double computing = run.wall_seconds - run.frame_seconds;
   report["wall_seconds"] = computing;
-  report["wall_seconds_per_frame"] = run.time > 0 ? computing / (run.time * 30) : 0.0;
+  report["wall_seconds_per_frame"] = run.time > run.from ? computing / ((run.time - run.from) * 30) : 0.0;
   report["seconds"] = {{"read", build.read_seconds},
                        {"trim", build.trim_seconds},
                        {"force", run.force_seconds},
@@ -94,6 +94,21 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   Json stages = Json::array({"shell"});
   if (system.projection) stages.push_back("projection");
   report["stages"] = stages;
+  // What each stage that ran took. `seconds` above counts the same seconds, of stages that didn't run too.
+  Json counters = {{"shell", {{"seconds", run.force_seconds}, {"bytes", build.model->table_bytes()}}}};
+  if (system.projection) {
+    counters["projection"] = {{"seconds", run.projection_seconds},
+                              {"bytes", sizeof(double) * system.projection->factor_nonzeros()}};
+  }
+  counters["steps"] = {{"count", run.steps + run.redone_steps}};
+  if (!scene.dt) counters["time_step"] = {{"seconds", run.bound_seconds}};
+  if (!scene.formats.empty()) counters["frames"] = {{"seconds", run.frame_seconds}};
+  if (run.allocations.known) {
+    counters["steps"]["allocations"] = run.allocations.steps;
+    if (!scene.dt) counters["time_step"]["allocations"] = run.allocations.bound;
+    if (!scene.formats.empty()) counters["frames"]["allocations"] = run.allocations.frames;
+  }
+  report["counters"] = counters;
   Json warnings = Json::array();
   for (const std::string& w : build.warnings) warnings.push_back(w);
   for (const std::string& w : run.warnings) warnings.push_back(w);

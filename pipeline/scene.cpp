@@ -343,6 +343,27 @@ void assign(toml::table& root, const std::string& setting) {
   }
 }
 
+// Appends every value below a node, and empty tables and arrays, which may mean something.
+void list_keys(const toml::node& node, const std::string& path,
+               std::vector<std::pair<std::string, std::string>>& keys) {
+  const auto below = [&](const auto& key) {
+    return path.empty() ? fmt::format("{}", key) : fmt::format("{}.{}", path, key);
+  };
+  if (const toml::table* table = node.as_table(); table && !table->empty()) {
+    for (const auto& [key, value] : *table) list_keys(value, below(key.str()), keys);
+  } else if (const toml::array* array = node.as_array(); array && !array->empty()) {
+    for (std::size_t k = 0; k < array->size(); ++k) list_keys((*array)[k], below(k), keys);
+  } else if (node.is_string()) {
+    keys.emplace_back(path, fmt::format("\"{}\"", *node.value<std::string>()));
+  } else if (node.is_boolean()) {
+    keys.emplace_back(path, *node.value<bool>() ? "true" : "false");
+  } else if (node.is_number()) {
+    keys.emplace_back(path, fmt::format("{}", *node.value<double>()));
+  } else {
+    keys.emplace_back(path, type_name(node));
+  }
+}
+
 Placement read_placement(Table table) {
   Placement place;
   if (const auto v = table.vector<3>("translate", dimension::length)) place.translate = *v;
@@ -622,6 +643,7 @@ void read_solver(Table table, Scene& scene) {
     }
     scene.until = table.quantity(*node, "until in [solver]", dimension::time, Range::positive);
   }
+  scene.time_limit = table.number("time_limit", dimension::time, Range::positive);
   table.done();
 }
 
@@ -701,6 +723,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   read_settings(top, scene);
   snap_releases(scene);
   top.done();
+  list_keys(root, "", scene.keys);
   return scene;
 }
 
@@ -790,6 +813,13 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
   Table top(root, "the scene", "--set");
   read_settings(top, scene);
   top.done();
+  for (std::size_t k = 0; k < request.pins.size(); ++k) {
+    scene.keys.emplace_back(fmt::format("--pin {}", k), request.pins[k]);
+  }
+  scene.keys.emplace_back("--fabric", request.fabric);
+  if (request.degree) scene.keys.emplace_back("--degree", fmt::format("{}", *request.degree));
+  if (request.span) scene.keys.emplace_back("--span", fmt::format("{} m", *request.span));
+  list_keys(root, "", scene.keys);
   return scene;
 }
 

@@ -351,6 +351,19 @@ void FastProjection::add_tension_stiffness(const Eigen::VectorXd& tensions, cons
 const Eigen::VectorXd& FastProjection::strain_multipliers() const { return impl_->strain_lambda; }
 const Eigen::Matrix3Xd& FastProjection::place_multipliers() const { return impl_->place_lambda; }
 const Eigen::Matrix3Xd& FastProjection::strain_impulses() const { return impl_->strain_impulse; }
+ProjectionMemory FastProjection::memory() const {
+  return {impl_->strain_lambda, impl_->place_lambda, impl_->strain_impulse};
+}
+bool FastProjection::restore(const ProjectionMemory& memory) {
+  Impl& s = *impl_;
+  if (memory.strain_multipliers.size() != s.strains() || memory.strain_impulses.cols() != s.strains() ||
+      memory.place_multipliers.cols() != s.places())
+    return false;
+  s.strain_lambda = memory.strain_multipliers;
+  s.place_lambda = memory.place_multipliers;
+  s.strain_impulse = memory.strain_impulses;
+  return true;
+}
 const ConstraintRows& FastProjection::rows() const { return impl_->rows; }
 const ProjectionOptions& FastProjection::options() const { return impl_->options; }
 std::size_t FastProjection::factor_nonzeros() const { return impl_->factor ? impl_->factor->factor_nonzeros() : 0; }

@@ -39,11 +39,17 @@ struct ProjectionReport {
   int iterations = 0;
   double strain_violation = 0;  // at the end: largest |C|, with slack in the band what C lies outside of it
   double place_violation = 0;   // m
-  double residual = 0.001;          // largest |C - law(lambda)| of rows with a stiffness, over the band
+  double residual = 0;          // largest |C - law(lambda)| of rows with a stiffness, over the band
   int worst_row = -1;           // strain row with the largest violation
   double energy = 0;            // J, of the limit laws at the end
   double tension = 0;           // 1/s2, largest pull of a row times its inertia: the frequency squared it gives its nodes
   double factor_seconds = 0;    // wall time of the numeric factorisations
+};
+
+// What the last projection left behind, for reactions: rows and shapes as below.
+struct ProjectionMemory {
+  Eigen::VectorXd strain_multipliers;
+  Eigen::Matrix3Xd place_multipliers, strain_impulses;
 };
 
 //   (1) fixed control points don't move;
@@ -75,6 +81,9 @@ class FastProjection {
   const Eigen::Matrix3Xd& place_multipliers() const;
   // Multiplier times direction, summed over the iterations [kg m]: control point I was pushed by -d_I times its column.
   const Eigen::Matrix3Xd& strain_impulses() const;
+  // All three, and putting them back where a run is taken up again; false where their sizes are of other rows.
+  ProjectionMemory memory() const;
+  bool restore(const ProjectionMemory& memory);
 
   // How far x is from the constraints, nothing moved.
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t);

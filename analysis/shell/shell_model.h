@@ -96,6 +96,11 @@ class ShellModel {
   CellShare stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q,
                           const Eigen::Ref<const Eigen::VectorXd>& dq) const;
 
+  // Forces and tangents by this many threads from now on: the same bits, as every sum keeps its order, but one caller
+  // at a time. Models of fewer than 8000 quadrature points stay on the caller's thread, which is faster. 1: no
+  // threads.
+  void use_threads(int count);
+
   std::size_t quadrature_points() const;
   std::size_t table_bytes() const;  // memory of the stored functions
 

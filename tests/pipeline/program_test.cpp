@@ -37,6 +37,24 @@ struct Small : Folder {
   }
 };
 
+void expect_same_results(const std::filesystem::path& a, const std::filesystem::path& b) {
+  int compared = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(a)) {
+    if (!entry.is_regular_file()) continue;
+    const auto name = std::filesystem::relative(entry.path(), a);
+    if (name == "run.log" || name == "report.json") continue;
+    EXPECT_EQ(read_file(entry.path()), read_file(b / name)) << name;
+    ++compared;
+  }
+  EXPECT_GT(compared, 20);
+  const auto report = [](const std::filesystem::path& folder) {
+    auto json = nlohmann::json::parse(read_file(folder / "report.json"));
+    for (const char* timing : {"seconds", "counters", "wall_seconds", "wall_seconds_per_frame"}) json.erase(timing);
+    return json;
+  };
+  EXPECT_EQ(report(a), report(b));
+}
+
 TEST(Program, DrapesAndReports) {
   const Small folder("drape");
   const Outcome run = toile(
@@ -68,6 +86,17 @@ TEST(Program, TheSameSceneWritesTheSameFiles) {
     ++compared;
   }
   EXPECT_GT(compared, 5);
+}
+
+TEST(Program, ThreadsGiveTheSameBytes) {
+  const Small folder("threads");
+  const std::string large =
+      "drape scene.toml --set 'output.formats=[\"vtu\", \"iges\", \"obj\"]' --set output.every=0.0025 "
+      "--until 0.005 --set strain_limit.mode=off --set panel.0.refine.control_points=[44,44] ";
+  ASSERT_EQ(toile(folder, large + "-o one").code, 0);
+  ASSERT_EQ(toile(folder, large + "-o two --threads 2").code, 0);
+  expect_same_results(folder / "one", folder / "two");
+  EXPECT_EQ(toile(folder, large + "-o none --threads 0").code, 2);
 }
 
 TEST(Program, APanelFileNeedsNoScene) {
@@ -223,6 +252,77 @@ TEST(Program, AnInterruptLeavesWholeFiles) {
   EXPECT_EQ(WEXITSTATUS(status), 130) << read_file(folder / "stderr.txt");
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "interrupted");
   EXPECT_EQ(toile(folder, "roundtrip result/draped.igs").code, 0);
+}
+
+// Long enough to be stopped on the way, with frames of every format.
+const std::string long_run =
+    "drape scene.toml --set 'output.formats=[\"vtu\", \"obj\", \"iges\"]' --set output.every=0.25 --until 2";
+
+// Starts a long run, sends it a signal a little after its first checkpoint is there, and returns how it ended.
+int end_by(const Folder& folder, const std::string& signal) {
+  const std::string command = "cd '" + folder.path().string() + "' && { '" TOILE_PROGRAM "' " + long_run +
+                              " -o result 2>stderr.txt & }; while [ ! -e result/checkpoint ]; do sleep 0.01; done; "
+                              "sleep 0.1; kill -" +
+                              signal + " $!; wait $!";
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(Program, AStoppedRunResumesToTheSameBytes) {
+  const Small folder("signals");
+  ASSERT_EQ(toile(folder, long_run + " -o whole").code, 0);
+  for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 130), std::pair("KILL", 128 + 9)}) {
+    std::filesystem::remove_all(folder / "result");
+    EXPECT_EQ(end_by(folder, signal), code) << signal << ": " << read_file(folder / "stderr.txt");
+    if (code == 130) {
+      EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "interrupted");
+      EXPECT_EQ(toile(folder, "roundtrip result/draped.igs").code, 0);
+    }
+    const Outcome resumed = toile(folder, long_run + " -o result --resume result/checkpoint");
+    ASSERT_EQ(resumed.code, 0) << signal << ": " << resumed.err;
+    expect_same_results(folder / "whole", folder / "result");
+  }
+}
+
+TEST(Program, ATimeLimitIsExit7AndEveryRunGetsAhead) {
+  const Small folder("time_limit");
+  Outcome run = toile(folder, "drape scene.toml -o result --time-limit 1e-9");
+  EXPECT_EQ(run.code, 7) << run.err;
+  EXPECT_NE(run.err.find("time limit"), std::string::npos) << run.err;
+  int runs = 1;
+  for (; run.code == 7 && runs < 1000; ++runs) {
+    const auto report = nlohmann::json::parse(read_file(folder / "result/report.json"));
+    ASSERT_EQ(report["exit"], "time_limit");
+    ASSERT_EQ(report["steps"], runs);
+    run = toile(folder,
+                "drape scene.toml -o result --resume result/checkpoint --set solver.time_limit=1e-9 --until 0.02");
+  }
+  EXPECT_EQ(run.code, 0) << run.err;
+  ASSERT_EQ(toile(folder, "drape scene.toml -o whole --until 0.02").code, 0);
+  EXPECT_EQ(read_file(folder / "result/draped.igs"), read_file(folder / "whole/draped.igs"));
+}
+
+TEST(Program, ACheckpointThatDoesNotFitIsExit3AndLeavesNoFile) {
+  const Small folder("misfit");
+  ASSERT_EQ(toile(folder, "drape scene.toml -o first --until 0.05").code, 0);
+  write_file(folder / "cut", read_file(folder / "first/checkpoint").substr(0, 500));
+  const auto refused = [&](const std::string& arguments, const std::string& part) {
+    const Outcome run = toile(folder, "drape scene.toml -o other " + arguments);
+    EXPECT_EQ(run.code, 3) << arguments << ": " << run.err;
+    EXPECT_NE(run.err.find(part), std::string::npos) << run.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "other"));
+  };
+  refused("--resume nowhere", "nowhere");
+  refused("--resume cut", "cut short");
+  refused("--resume scene.toml", "no checkpoint");
+  refused("--resume first/checkpoint --until 0.01", "solver.until");
+  refused("--resume first/checkpoint --set load.wind=[1,0,0]", "load.wind");
+  EXPECT_EQ(toile(folder, "drape scene.toml --dry-run --resume first/checkpoint").code, 2);
+  // Into another folder, on to a later time.
+  EXPECT_EQ(toile(folder, "drape scene.toml -o other --resume first/checkpoint").code, 0);
+  ASSERT_EQ(toile(folder, "drape scene.toml -o whole").code, 0);
+  EXPECT_EQ(read_file(folder / "other/draped.igs"), read_file(folder / "whole/draped.igs"));
+  EXPECT_EQ(toile(folder, "drape scene.toml -o whole --resume first/checkpoint").code, 8) << "another run's folder";
 }
 
 TEST(Program, TemplatesRunAtOnce) {
