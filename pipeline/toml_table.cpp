@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <tuple>
 
 #include "geometry/error.h"
 
@@ -70,6 +74,52 @@ const char* type_name(const toml::node& node) {
     default:
       return "a date or time";
   }
+}
+
+std::string toml_text(const toml::node& node) {
+  const auto quoted = [](const std::string& text) { return nlohmann::json(text).dump(); };
+  const auto key_text = [&](const std::string& key) {
+    const auto bare = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
+    return !key.empty() && std::ranges::all_of(key, bare) ? key : quoted(key);
+  };
+  if (const toml::table* table = node.as_table()) {
+    std::string out;
+    for (const auto& [key, value] : in_file_order(*table)) {
+      out += (out.empty() ? " " : ", ") + key_text(key) + " = " + toml_text(*value);
+    }
+    return "{" + out + " }";
+  }
+  if (const toml::array* array = node.as_array()) {
+    std::string out;
+    for (const toml::node& value : *array) out += (out.empty() ? "" : ", ") + toml_text(value);
+    return "[" + out + "]";
+  }
+  if (node.is_string()) return quoted(*node.value<std::string>());
+  if (node.is_boolean()) return *node.value<bool>() ? "true" : "false";
+  if (node.is_integer()) return fmt::format("{}", *node.value<std::int64_t>());
+  if (node.is_floating_point()) {
+    const std::string text = fmt::format("{}", *node.value<double>());
+    return text.find_first_of(".einf") == std::string::npos ? text + ".0" : text;
+  }
+  std::ostringstream date;
+  node.visit([&](const auto& value) {
+    if constexpr (toml::is_date<decltype(value)> || toml::is_time<decltype(value)> ||
+                  toml::is_date_time<decltype(value)>) {
+      date << value;
+    }
+  });
+  return date.str();
+}
+
+std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table) {
+  std::vector<std::tuple<toml::source_index, toml::source_index, std::string, const toml::node*>> keys;
+  for (const auto& [key, node] : table) {
+    keys.emplace_back(key.source().begin.line, key.source().begin.column, std::string(key.str()), &node);
+  }
+  std::ranges::sort(keys);
+  std::vector<std::pair<std::string, const toml::node*>> result;
+  for (const auto& [line, column, key, node] : keys) result.emplace_back(key, node);
+  return result;
 }
 
 const toml::node* Table::find(const std::string& key) {
@@ -221,7 +271,7 @@ void Table::done() const {
     if (std::ranges::find(known_, name) != known_.end()) continue;
     const auto line = key.source().begin.line;
     const std::string at = line > 0 ? fmt::format("{}:{}", file_, line) : file_ + " (--set)";
-    throw InputError(fmt::format("{}: unknown key '{}' in {}{}", at, name, name_, suggestion(name, known_)));
+    throw UnknownKeyError(fmt::format("{}: unknown key '{}' in {}{}", at, name, name_, suggestion(name, known_)));
   }
 }
 

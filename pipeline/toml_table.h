@@ -16,9 +16,14 @@
 #include <string_view>
 #include <vector>
 
+#include "geometry/error.h"
 #include "pipeline/units.h"
 
 namespace toile {
+
+struct UnknownKeyError : InputError {
+  using InputError::InputError;
+};
 
 // Throws InputError `file:line: what` where the text is no TOML.
 toml::table parse_toml(std::string_view text, const std::filesystem::path& path);
@@ -29,10 +34,17 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& po
 // "a table", "a string", ...
 const char* type_name(const toml::node& node);
 
+// A value as TOML reads it, on one line.
+std::string toml_text(const toml::node& node);
+
+// The keys of a table as the file has them; where it has no lines, by name.
+std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml::table& table);
+
 enum class Range { any, nonnegative, positive };
 
 // Keys of one table, each asked for by name. Getters return nothing (or leave the target) where the key is missing and
-// throw InputError `file:line: ...` where its value is of another kind; `done` throws for a key that nobody asked for.
+// throw InputError `file:line: ...` where its value is of another kind; `done` throws UnknownKeyError for a key that
+// nobody asked for.
 class Table {
  public:
   Table(const toml::table& table, std::string name, std::string file)
