@@ -77,9 +77,14 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::fi
     if (ended.si_pid == child) break;
     if (result.end == ProcessResult::End::exited) {
       if (stop && stop()) result.end = ProcessResult::End::stopped;
-      if (elapsed() > limits.seconds) result.end = ProcessResult::End::timed_out;
+      if (elapsed() > limits.seconds) {
+        result.end = ProcessResult::End::timed_out;
+        ::kill(-child, SIGINT);
+      }
     }
-    if (result.end != ProcessResult::End::exited) ::kill(-child, SIGKILL);
+    const bool patience =
+        result.end == ProcessResult::End::timed_out && elapsed() < limits.seconds + limits.grace_seconds;
+    if (result.end != ProcessResult::End::exited && !patience) ::kill(-child, SIGKILL);
     std::this_thread::sleep_for(std::chrono::milliseconds(elapsed() < 0.1 ? 1 : 10));
   }
   ::kill(-child, SIGKILL);  // what it left running; until it is waited for, the number can't be another's
@@ -88,6 +93,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::fi
   result.cpu_seconds = static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
                        1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
   result.peak_megabytes = 1.024e-3 * static_cast<double>(usage.ru_maxrss);
+  result.answered = result.end == ProcessResult::End::timed_out && WIFEXITED(status);
   if (result.end == ProcessResult::End::exited) {
     if (WIFSIGNALED(status)) result.end = ProcessResult::End::killed_by_signal;
     result.code = WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status);

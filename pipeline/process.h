@@ -9,13 +9,15 @@
 namespace toile {
 
 struct ProcessLimits {
-  double seconds = 600;     // wall time, then SIGKILL to it and what it started
-  double megabytes = 4096;  // address space (RLIMIT_AS)
+  double seconds = 600;      // wall time, then SIGINT to it and what it started
+  double grace_seconds = 5;  // from there to SIGKILL
+  double megabytes = 4096;   // address space (RLIMIT_AS)
 };
 
 struct ProcessResult {
   enum class End { exited, killed_by_signal, timed_out, stopped } end = End::exited;
-  int code = 0;  // exit code or signal
+  bool answered = false;  // timed out, and ended of its own on SIGINT: slow, not hanging
+  int code = 0;           // exit code or signal
   double wall_seconds = 0, cpu_seconds = 0;
   double peak_megabytes = 0;  // resident
 };

@@ -174,6 +174,9 @@ void judge(StudyRun& run, const std::filesystem::path& directory) {
       run.verdict = Verdict::stopped;
       return;
     case RunStatus::timeout:
+      if (!run.process.answered) return bad("it hangs: " + run.cause);
+      run.verdict = Verdict::stopped;
+      return;
     case RunStatus::failed:
       return bad(run.cause);
     case RunStatus::not_run:

@@ -136,7 +136,8 @@ void evaluate(const Study& study, StudyResult& result);
 
 // Stable, refused, stopped or bad, with the cause, of a run that ended, whose files are in `directory`.
 //   stable: exit ok, less energy injected than 1 % of the work of gravity, the strain limit kept where there is one;
-//   refused: exit 3 or 4 with a cause, no files; stopped: exit 5, 6 or 7 with a cause;
+//   refused: exit 3 or 4 with a cause, no files; stopped: exit 5, 6 or 7 with a cause, or out of time and
+//   ending when asked to;
 //   bad: everything else, and any run with a number in its files that isn't finite.
 void judge(StudyRun& run, const std::filesystem::path& directory);
 

@@ -92,6 +92,12 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows) {
   return out;
 }
 
+// Some series has a reference.
+bool compared(const Study& study) {
+  return std::ranges::any_of(study.series,
+                             [](const StudySeries& s) { return s.reference.kind != StudyReference::Kind::none; });
+}
+
 std::string wall_text(const CaseResult& c) {
   if (!(c.wall > 0)) return "";
   if (c.runs.size() == 1) return fmt::format("{:.3g}", c.wall);
@@ -302,7 +308,10 @@ std::string study_csv(const Study& study, const StudyResult& result) {
 
 std::string study_table(const Study& study, const StudyResult& result) {
   std::string out = study.title + "\n";
-  std::vector<std::vector<std::string>> rows{{"series", "case", "dofs", "dt [s]", "error", "wall [s]"}};
+  const bool errors = compared(study);
+  std::vector<std::vector<std::string>> rows{{"series", "case", "dofs", "dt [s]"}};
+  if (errors) rows[0].push_back("error");
+  rows[0].push_back("wall [s]");
   for (const std::string& column : study.columns) rows[0].push_back(column);
   rows[0].push_back(study.stability ? "verdict" : "status");
   rows[0].push_back("cause");
@@ -310,12 +319,10 @@ std::string study_table(const Study& study, const StudyResult& result) {
     for (std::size_t k = 0; k < study.series[s].cases.size(); ++k) {
       const CaseResult& c = result.series[s].cases[k];
       const StudyRun& run = c.shown();
-      std::vector<std::string> row{study.series[s].name,
-                                   study.series[s].cases[k].label,
-                                   run.facts.dofs ? fmt::format("{:g}", *run.facts.dofs) : "",
-                                   rounded(run.facts.dt),
-                                   rounded(run.error),
-                                   wall_text(c)};
+      std::vector<std::string> row{study.series[s].name, study.series[s].cases[k].label,
+                                   run.facts.dofs ? fmt::format("{:g}", *run.facts.dofs) : "", rounded(run.facts.dt)};
+      if (errors) row.push_back(rounded(run.error));
+      row.push_back(wall_text(c));
       for (std::size_t i = 0; i < study.columns.size(); ++i) {
         const std::string& cell = i < run.facts.columns.size() ? run.facts.columns[i] : "";
         char* end = nullptr;
@@ -428,9 +435,7 @@ std::vector<std::pair<std::string, std::string>> study_plots(const Study& study,
   const auto dofs = [](const CaseResult& c) { return c.shown().facts.dofs; };
   const auto dt = [](const CaseResult& c) { return c.shown().facts.dt; };
   const auto wall = [](const CaseResult& c) { return c.wall > 0 ? std::optional(c.wall) : std::nullopt; };
-  const bool errors = std::ranges::any_of(
-      study.series, [](const StudySeries& s) { return s.reference.kind != StudyReference::Kind::none; });
-  if (errors) {
+  if (compared(study)) {
     plots.emplace_back("error_over_time.svg",
                        log_plot_svg(error_plot(study, result, "wall time [s], median and spread", true, wall)));
     plots.emplace_back("error_over_dofs.svg",

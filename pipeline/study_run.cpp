@@ -223,7 +223,7 @@ void classify(StudyRun& run, const fs::path& log, const ProcessLimits& limits) {
   run.cause = stated_cause(log);
   if (p.end == End::timed_out) {
     run.status = RunStatus::timeout;
-    run.cause = fmt::format("not done after {:g} s", limits.seconds);
+    run.cause = fmt::format("not done after {:g} s{}{}", limits.seconds, run.cause.empty() ? "" : ": ", run.cause);
     return;
   }
   if (p.end == End::killed_by_signal) {
@@ -360,11 +360,12 @@ class Runner {
     if (!fs::exists(file, error)) return false;
     const Json json = Json::parse(read_file(file), nullptr, false);
     if (!json.is_object()) return false;
-    for (const char* key : {"end", "code", "wall_seconds", "cpu_seconds", "peak_megabytes"}) {
+    for (const char* key : {"end", "answered", "code", "wall_seconds", "cpu_seconds", "peak_megabytes"}) {
       if (!json.contains(key) || !json[key].is_number()) return false;
     }
     if (!json.contains("input") || json["input"] != input) return false;
     result.end = static_cast<ProcessResult::End>(json["end"].get<int>());
+    result.answered = json["answered"].get<int>() != 0;
     result.code = json["code"];
     result.wall_seconds = json["wall_seconds"];
     result.cpu_seconds = json["cpu_seconds"];
@@ -375,6 +376,7 @@ class Runner {
   static void write_record(const fs::path& file, const std::string& input, const ProcessResult& result) {
     const Json json = {{"input", input},
                        {"end", static_cast<int>(result.end)},
+                       {"answered", result.answered ? 1 : 0},
                        {"code", result.code},
                        {"wall_seconds", result.wall_seconds},
                        {"cpu_seconds", result.cpu_seconds},

@@ -48,7 +48,8 @@ case $mode in
   silent) exit 4 ;;
   solver) echo "error: diverged" >&2; exit 5 ;;
   crash) kill -SEGV $$ ;;
-  hang) sleep 1000 & echo $! > "$here/sleeper"; wait ;;
+  slow) trap 'echo "error: interrupted at t = 0.1 s" >&2; exit 130' INT; sleep 1000 & wait ;;
+  hang) trap '' INT; sleep 1000 & echo $! > "$here/sleeper"; wait; wait ;;
   nothing) exit 0 ;;
   gains) injected=0.02 ;;
   overstrained) strain=0.02 ;;
@@ -94,7 +95,9 @@ struct Lab : Folder {
     int code = -1;
     std::exception_ptr trouble;
     try {
-      code = run_study(read_study(*this / "study.toml"), options, console);
+      Study study = read_study(*this / "study.toml");
+      study.limits.grace_seconds = 0.3;
+      code = run_study(study, options, console);
     } catch (...) {
       trouble = std::current_exception();
     }
@@ -327,10 +330,10 @@ TEST(Study, AMissingQuantityNamesTheNearest) {
 TEST(Study, StabilityIsAVerdictOnEachRun) {
   Lab lab("stability");
   const std::string head = "kind = \"stability\"\nlimits.seconds = 0.5\n";
-  EXPECT_EQ(lab.run(head + "vary.panel.0.name = [\"fine\", \"refuse\", \"solver\", \"limit\"]\n"), 0);
+  EXPECT_EQ(lab.run(head + "vary.panel.0.name = [\"fine\", \"refuse\", \"solver\", \"limit\", \"slow\"]\n"), 0);
   auto rows = csv(read_file(lab / "out/study.csv"));
-  EXPECT_EQ(column(rows, "verdict"), (std::vector<std::string>{"stable", "refused", "stopped", "stopped"}));
-  EXPECT_NE(lab.table.find("1 stable, 1 refused, 2 stopped, 0 BAD"), std::string::npos) << lab.table;
+  EXPECT_EQ(column(rows, "verdict"), (std::vector<std::string>{"stable", "refused", "stopped", "stopped", "stopped"}));
+  EXPECT_NE(lab.table.find("1 stable, 1 refused, 3 stopped, 0 BAD"), std::string::npos) << lab.table;
   for (const char* mode : {"silent", "crash", "hang", "nothing", "gains", "overstrained", "null", "word"}) {
     EXPECT_EQ(lab.run(head + "set.panel.0.name = \"" + std::string(mode) + "\"\n"), 6) << mode;
     rows = csv(read_file(lab / "out/study.csv"));
