@@ -96,7 +96,8 @@ constexpr double right = left + plot_width, bottom = top + plot_height;
 
 struct Axes {
   LogAxis x, y;
-  bool failures = false;
+  bool failures = false;  // some point has no y
+  bool crosses = false;   // some point failed
   Vector2d place(const PlotPoint& p, int without_x = 0) const {
     return {p.x ? x(*p.x) : left + 10 + 14 * without_x, p.y ? y(*p.y) : top + 0.5 * band};
   }
@@ -112,6 +113,7 @@ Axes axes_of(const LogPlot& plot) {
         if (p.x && p.x_low < p.x_high) xs.insert(xs.end(), {p.x_low, p.x_high});
         if (p.y) ys.push_back(*p.y);
         axes.failures = axes.failures || !p.y;
+        axes.crosses = axes.crosses || p.failed;
       }
     }
     if (s.level) ys.push_back(*s.level);
@@ -183,7 +185,7 @@ void draw_series(Svg& svg, const PlotSeries& series, std::size_t k, const Axes& 
 }
 
 // Returns the height that it takes.
-double draw_legend(Svg& svg, const LogPlot& plot) {
+double draw_legend(Svg& svg, const LogPlot& plot, bool failures) {
   double y = top + 10;
   constexpr double x = right + 22;
   bool levels = false;
@@ -203,9 +205,12 @@ double draw_legend(Svg& svg, const LogPlot& plot) {
     svg.text({x + 12, y}, 11, plot.level, "", TextAnchor::start);
     y += 18;
   }
-  svg.path(cross({x, y - 4}, 5), "stroke=\"#444\" stroke-width=\"2\"");
-  svg.text({x + 12, y}, 11, "failed or a check not met", "", TextAnchor::start);
-  return y + 20;
+  if (failures) {
+    svg.path(cross({x, y - 4}, 5), "stroke=\"#444\" stroke-width=\"2\"");
+    svg.text({x + 12, y}, 11, "failed or a check not met", "", TextAnchor::start);
+    y += 18;
+  }
+  return y + 2;
 }
 
 // 1, 2 or 5 times a power of ten, some five of them up to `most`.
@@ -225,7 +230,7 @@ std::string log_plot_svg(const LogPlot& plot) {
   draw_axes(svg, plot, axes);
   int without_x = 0;
   for (std::size_t k = 0; k < plot.series.size(); ++k) draw_series(svg, plot.series[k], k, axes, plot.level, without_x);
-  const double height = std::max(bottom + 60, draw_legend(svg, plot));
+  const double height = std::max(bottom + 60, draw_legend(svg, plot, axes.crosses));
   return svg.finish(right + 360, height, plot.title, style_sheet);
 }
 

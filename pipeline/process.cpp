@@ -34,6 +34,7 @@ void limit(int resource, double amount) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(cannot_execute);
   std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
   limit(RLIMIT_AS, limits.megabytes * 1e6);
   limit(RLIMIT_CORE, 0);
   const int empty = ::open("/dev/null", O_RDONLY);

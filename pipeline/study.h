@@ -20,6 +20,7 @@ namespace toile {
 // A scene key and its value as TOML text: what --set takes.
 struct StudySetting {
   std::string key, value;
+  std::string where;  // "study.toml:12"
   std::string text() const { return key + "=" + value; }
 };
 
@@ -81,8 +82,8 @@ const char* name(Verdict verdict);
 // What a run's report says, as far as it goes.
 struct RunFacts {
   std::string model, scheme, mesh, degree, spans;
-  std::optional<double> elements;  // knot spans of all panels
-  std::optional<double> dofs, dt;  // dt: mean step [s]
+  std::optional<double> spans_u, spans_v, elements;  // knot spans a direction and in all, summed over panels
+  std::optional<double> dofs, dt;                    // dt: mean step [s]
   std::optional<double> wall_seconds;
   std::map<std::string, double> seconds;  // by phase
   Eigen::VectorXd value;                  // empty where the quantity isn't there
@@ -153,7 +154,8 @@ struct StudyOptions {
 };
 
 // Runs what isn't there yet and writes study.csv, study.json and the plots. Returns the exit code: 6 where a check
-// failed, a run is bad or no run has a value; 130 after SIGINT, with the finished runs written. Throws OutputError.
+// failed, a run is bad or no run has a value; 130 after SIGINT or SIGTERM, with the finished runs written. Throws
+// OutputError.
 int run_study(const Study& study, const StudyOptions& options, Console& console);
 
 std::string study_csv(const Study& study, const StudyResult& result);

@@ -59,8 +59,15 @@ Size size_along(const SeriesResult& result, const std::vector<std::size_t>& case
     }
     return size;
   };
-  const auto inverse_root = [](std::optional<double> n) { return n ? std::optional(1 / std::sqrt(*n)) : n; };
-  Size size = falling("h", [&](const RunFacts& f) { return inverse_root(f.elements ? f.elements : f.dofs); });
+  // Where one direction keeps its spans, the other one's count.
+  const auto kept = [&](std::optional<double> RunFacts::*count) {
+    return std::ranges::all_of(cases, [&](std::size_t k) { return facts(k).*count == facts(cases[0]).*count; });
+  };
+  const bool only_u = kept(&RunFacts::spans_v), only_v = kept(&RunFacts::spans_u);
+  Size size = falling("h", [&](const RunFacts& f) -> std::optional<double> {
+    if (!f.elements) return f.dofs ? std::optional(1 / std::sqrt(*f.dofs)) : std::nullopt;
+    return only_u ? 1 / *f.spans_u : only_v ? 1 / *f.spans_v : 1 / std::sqrt(*f.elements);
+  });
   if (size.name.empty()) size = falling("dt", [](const RunFacts& f) { return f.dt; });
   return size;
 }

@@ -42,7 +42,8 @@ std::vector<StudySetting> read_set(Table& table, const std::string& name) {
   std::vector<StudySetting> result;
   const auto set = table.table("set", name);
   if (!set) return result;
-  for (const Leaf& leaf : leaves(set->raw())) result.push_back({leaf.key, toml_text(*leaf.node)});
+  for (const Leaf& leaf : leaves(set->raw()))
+    result.push_back({leaf.key, toml_text(*leaf.node), set->place(*leaf.node)});
   return result;
 }
 
@@ -221,7 +222,7 @@ std::vector<Axis> read_axes(Table& table) {
       std::string label = row.string("label").value_or(""), made;
       for (const Leaf& leaf : leaves(row.raw())) {
         if (leaf.key == "label") continue;
-        settings.push_back({leaf.key, toml_text(*leaf.node)});
+        settings.push_back({leaf.key, toml_text(*leaf.node), row.place(*leaf.node)});
         made += (made.empty() ? "" : ", ") + tail(leaf.key) + " = " + settings.back().value;
       }
       axis.entries.emplace_back(label.empty() ? made : label, settings);
@@ -237,7 +238,7 @@ std::vector<Axis> read_axes(Table& table) {
       Axis axis{tail(leaf.key), {}};
       for (const toml::node& value : *values) {
         const std::string text = toml_text(value);
-        axis.entries.push_back({axis.name + " = " + text, {{leaf.key, text}}});
+        axis.entries.push_back({axis.name + " = " + text, {{leaf.key, text, table.place(value)}}});
       }
       axes.push_back(std::move(axis));
     }
@@ -245,17 +246,28 @@ std::vector<Axis> read_axes(Table& table) {
   return axes;
 }
 
-// A key that the scene doesn't know spoils every run: better said at once. What else is wrong with a scene is a result.
-void require_known_keys(Table& table, const StudySeries& series) {
-  for (const StudyCase& c : series.cases) {
-    std::vector<std::string> settings;
-    for (const StudySetting& setting : c.settings) settings.push_back(setting.text());
+// A key that the scene doesn't know spoils every run: better said at once, with the setting that brings it. What else
+// is wrong with a scene is a result.
+void require_known_keys(const StudySeries& series) {
+  const auto unknown = [&](const std::vector<std::string>& settings) -> std::string {
     try {
       read_scene(series.scene, settings);
     } catch (const UnknownKeyError& error) {
-      throw InputError(fmt::format("{}: series '{}', {}: {}", table.where(), series.name,
-                                   c.label.empty() ? "its only case" : c.label, error.what()));
+      return error.what();
     } catch (const InputError&) {
+    }
+    return "";
+  };
+  for (const StudyCase& c : series.cases) {
+    std::vector<std::string> settings;
+    for (const StudySetting& setting : c.settings) settings.push_back(setting.text());
+    const std::string trouble = unknown(settings);
+    if (trouble.empty()) continue;
+    settings.clear();
+    if (!unknown(settings).empty()) throw InputError(trouble);
+    for (const StudySetting& setting : c.settings) {
+      settings.push_back(setting.text());
+      if (!unknown(settings).empty()) throw InputError(fmt::format("{}: {}: {}", setting.where, setting.key, trouble));
     }
   }
 }
@@ -312,7 +324,7 @@ void require_complete(Table& table, const StudySeries& series, const Study& stud
   if (series.quantity.paths.empty() && series.reference.kind != StudyReference::Kind::none) {
     table.missing("quantity", "what is compared with the reference");
   }
-  require_known_keys(table, series);
+  require_known_keys(series);
 }
 
 // `base` has what the study says for all series.

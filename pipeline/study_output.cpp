@@ -234,7 +234,7 @@ BarPlot phase_plot(const Study& study, const StudyResult& result) {
       for (const std::string& phase : plot.parts) lengths.push_back(phase_median(c, phase));
       const std::string& label = study.series[s].cases[k].label;
       const std::string row = fmt::format("{}{}{}", study.series[s].name, label.empty() ? "" : ": ", label);
-      plot.rows.emplace_back(failed(c) ? row + fmt::format(" ({})", name(c.shown().status)) : row, std::move(lengths));
+      plot.rows.emplace_back(failed(c) ? fmt::format("[{}] {}", name(c.shown().status), row) : row, std::move(lengths));
     }
   }
   return plot;

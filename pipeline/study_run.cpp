@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <csignal>
@@ -29,16 +30,20 @@ void on_interrupt(int) {
   interrupted = 1;
 }
 
+// While this lives, SIGINT and SIGTERM end the present run and the study.
 class InterruptGuard {
  public:
   InterruptGuard() {
     interrupted = 0;
-    previous_ = std::signal(SIGINT, on_interrupt);
+    for (std::size_t k = 0; k < signals.size(); ++k) previous_[k] = std::signal(signals[k], on_interrupt);
   }
-  ~InterruptGuard() { std::signal(SIGINT, previous_); }
+  ~InterruptGuard() {
+    for (std::size_t k = 0; k < signals.size(); ++k) std::signal(signals[k], previous_[k]);
+  }
 
  private:
-  void (*previous_)(int) = nullptr;
+  static constexpr std::array<int, 2> signals{SIGINT, SIGTERM};
+  std::array<void (*)(int), 2> previous_{};
 };
 
 // FNV-1a, 64 bits: tells inputs apart, guards nothing.
@@ -142,7 +147,7 @@ bool collect(const Json& json, std::vector<double>& numbers) {
 // Degree, spans and mesh over all panels: "2", "8x8", "uncut"; several panels joined by "+".
 void read_panels(const Json& report, RunFacts& facts) {
   if (!report.contains("panels") || !report["panels"].is_array()) return;
-  double elements = 0;
+  double elements = 0, along_u = 0, along_v = 0;
   bool cut = false;
   std::vector<std::string> degrees, spans;
   for (const Json& panel : report["panels"]) {
@@ -152,6 +157,8 @@ void read_panels(const Json& report, RunFacts& facts) {
     degrees.push_back(p[0] == p[1] ? fmt::format("{}", p[0]) : fmt::format("{}x{}", p[0], p[1]));
     spans.push_back(fmt::format("{}x{}", s[0], s[1]));
     elements += s[0] * s[1];
+    along_u += s[0];
+    along_v += s[1];
     cut = cut || number(panel, "cells.cut").value_or(0) > 0;
   }
   if (std::ranges::all_of(degrees, [&](const std::string& d) { return d == degrees[0]; })) degrees.resize(1);
@@ -159,6 +166,8 @@ void read_panels(const Json& report, RunFacts& facts) {
   facts.spans = fmt::format("{}", fmt::join(spans, "+"));
   facts.mesh = cut ? "cut" : "uncut";
   facts.elements = elements;
+  facts.spans_u = along_u;
+  facts.spans_v = along_v;
 }
 
 // Returns what is wrong with the report; empty where it has the quantity.

@@ -181,6 +181,7 @@ TEST(Program, AStudyRunsThisProgram) {
   const Small folder("study");
   write_file(folder / "study.toml",
              "scene = \"scene.toml\"\nquantity.of = \"lowest\"\nreference.kind = \"finest\"\n"
+             "limits.megabytes = 1e9  # sanitizers reserve address space\n"
              "vary.panel.0.refine.spans = [[5, 5], [10, 10]]\n");
   const Outcome run = toile(folder, "study study.toml -o result");
   ASSERT_EQ(run.code, 0) << run.err;
@@ -198,7 +199,7 @@ TEST(Program, AnInterruptedStudyGoesOnLater) {
   const Small folder("study_interrupt");
   write_file(folder / "study.toml",
              "scene = \"scene.toml\"\nquantity.of = \"lowest\"\nreference.kind = \"finest\"\n"
-             "vary.solver.until = [0.01, 100000]\n[set]\noutput.every = 1\n");
+             "limits.megabytes = 1e9\nvary.solver.until = [0.01, 100000]\n[set]\noutput.every = 1\n");
   const std::string command = "cd '" + folder.path().string() +
                               "' && timeout --preserve-status -s INT 2 '" TOILE_PROGRAM
                               "' study study.toml -o result >stdout.txt 2>stderr.txt";

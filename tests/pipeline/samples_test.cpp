@@ -97,7 +97,8 @@ TEST(Samples, TurnedNetsDrapeLikeTheFittedOne) {
 }
 
 // Runs a study with its results in `folder`; returns the exit code and what it prints.
-std::pair<int, std::string> run_sample_study(const Study& study, const std::filesystem::path& folder) {
+std::pair<int, std::string> run_sample_study(Study study, const std::filesystem::path& folder) {
+  study.limits.megabytes = 1e9;  // sanitizers reserve address space
   StudyOptions options;
   options.program = TOILE_PROGRAM;
   options.directory = folder;

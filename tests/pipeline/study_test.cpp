@@ -26,7 +26,7 @@ using test::Folder;
 
 // `drape SCENE --set KEY=VALUE ... -o DIR ...`: value = 3 + dt^2; what else it does is told by panel.0.name.
 constexpr const char* fake_program = R"(#!/bin/sh
-dir= dt=0.5 mode= size=0
+dir= dt=0.5 mode= size=4,5
 while [ $# -gt 0 ]; do
   case $1 in
     -o) dir=$2; shift ;;
@@ -34,7 +34,7 @@ while [ $# -gt 0 ]; do
       case $2 in
         solver.dt=*) dt=${2#solver.dt=} ;;
         panel.0.name=*) mode=$(echo "${2#panel.0.name=}" | tr -d '"') ;;
-        panel.0.refine.spans=*) size=$(echo "$2" | tr -dc '0-9,' | cut -d, -f2) ;;
+        panel.0.refine.spans=*) size=$(echo "${2#*=}" | tr -dc '0-9,') ;;
       esac
       shift ;;
   esac
@@ -59,10 +59,11 @@ case $mode in
 esac
 mkdir -p "$dir"
 [ "$mode" = word ] && echo "x -nan y" > "$dir/draped.igs"
+[ "$mode" = mesh ] && dt=$(awk "BEGIN { print 1 / ${size%,*} }")
 value=$(awk "BEGIN { printf \"%.17g\", 3 + $dt * $dt + $seed }")
 cat > "$dir/report.json" <<END
 {"model": "shell", "scheme": "verlet", "degrees_of_freedom": 12, "steps": 1, "simulated_seconds": $dt,
- "panels": [{"degree": [2, 3], "spans": [4, 5], "cells": {"cut": 1}}],
+ "panels": [{"degree": [2, 3], "spans": [$size], "cells": {"cut": 1}}],
  "wall_seconds": 0.25, "seconds": {"force": 0.2, "write": 0.1},
  "strain": {"at_constraints_max": $strain, "limit": 0.01}, "energy": {"injected": $injected, "gravity": $gravity},
  "points": [{"position": [1, 2, $value]}], "memory": $(ulimit -v),
@@ -153,6 +154,18 @@ TEST(Study, FindsTheOrderOfItsRuns) {
     EXPECT_TRUE(std::filesystem::exists(lab / "out" / plot)) << plot;
   }
   EXPECT_NE(read_file(lab / "out/error_over_dt.svg").find("order 2.00 in dt"), std::string::npos);
+}
+
+TEST(Study, OrdersInTheMeshCountTheRefinedDirection) {
+  Lab lab("mesh");
+  const std::string mesh = depth + three + "set.panel.0.name = \"mesh\"\nset.solver.dt = 0.1\n";
+  for (const char* spans : {"[[2, 3], [4, 3], [8, 3]]", "[[2, 4], [4, 8], [8, 16]]"}) {
+    ASSERT_EQ(lab.run(mesh + "vary.panel.0.refine.spans = " + spans + "\n"), 0);
+    const json orders = lab.result()["series"][0]["orders"];
+    ASSERT_EQ(orders.size(), 1u);
+    EXPECT_EQ(orders[0]["in"], "h");
+    EXPECT_NEAR(orders[0]["slope"], 2, 1e-9) << spans;
+  }
 }
 
 TEST(Study, TheFinestRunAndRichardsonStateTheirUncertainty) {
@@ -423,7 +436,7 @@ TEST(Study, UnknownSceneKeysAreRefusedAtOnce) {
   } catch (const InputError& error) {
     const std::string what = error.what();
     EXPECT_NE(what.find("did you mean 'dt'?"), std::string::npos) << what;
-    EXPECT_NE(what.find("study.toml:1: series"), std::string::npos) << what;
+    EXPECT_NE(what.find("study.toml:4: solver.dtt: "), std::string::npos) << what;
   }
   // A value that a scene refuses is a result.
   write_file(folder / "study.toml", study_text(depth + three + "vary.solver.dt = [-1]\n"));
