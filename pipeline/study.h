@@ -119,8 +119,8 @@ struct AxisOrder {
 struct SeriesResult {
   std::vector<CaseResult> cases;  // as in the series
   Eigen::VectorXd reference;      // empty: there is none, see `no_reference`
-  double uncertainty = 0;
-  std::string reference_text;  // what it is, its uncertainty and where that comes from
+  double uncertainty = 0;         // NaN: unknown
+  std::string reference_text;     // what it is, its uncertainty and where that comes from
   std::string no_reference;
   std::vector<AxisOrder> orders;  // each along one axis, the others at their last entry
 };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pipeline/study.h"
 
@@ -20,7 +21,8 @@ void collect_repeats(CaseResult& c) {
     if (run.facts.wall_seconds) wall.push_back(*run.facts.wall_seconds);
     if (run.facts.value.size() == 0) continue;
     if (!c.first) c.first = k;
-    c.differs = c.differs || run.facts.value != c.shown().facts.value;
+    const Eigen::VectorXd& first = c.shown().facts.value;
+    c.differs = c.differs || run.facts.value.size() != first.size() || run.facts.value != first;
   }
   if (wall.empty()) return;
   c.wall = median(wall);
@@ -95,17 +97,17 @@ Reference finest(const StudySeries& series, const SeriesResult& result) {
     for (std::size_t k = line.size(); k-- > 0;) {
       if (line[k] >= best || !usable(result.cases[line[k]])) continue;
       const Eigen::VectorXd& other = result.cases[line[k]].shown().facts.value;
-      if (other.size() == r.value.size()) r.uncertainty = std::max(r.uncertainty, (other - r.value).norm());
+      if (other.size() != r.value.size()) continue;
+      r.uncertainty = std::max(r.uncertainty, (other - r.value).norm());
       neighbours += (neighbours.empty() ? "" : " and ") + series.cases[line[k]].label;
       break;
     }
   }
   const bool last = best + 1 == series.cases.size();
-  r.text = fmt::format("{} ({}{}), uncertainty {}", last ? "the finest run" : "the finest run that finished",
-                       result.cases.size() == series.cases.size() && !series.cases[best].label.empty()
-                           ? series.cases[best].label
-                           : series.name,
-                       series.name.empty() ? "" : " of " + series.name,
+  const std::string& label = series.cases[best].label;
+  if (neighbours.empty()) r.uncertainty = std::numeric_limits<double>::quiet_NaN();
+  r.text = fmt::format("the finest run{} of {}{}{}, uncertainty {}", last ? "" : " that finished", series.name,
+                       label.empty() ? "" : ": ", label,
                        neighbours.empty() ? "unknown, no other run finished"
                                           : fmt::format("{:.3g}: distance to {}", r.uncertainty, neighbours));
   return r;
@@ -134,6 +136,10 @@ Reference extrapolated(const StudySeries& series, const SeriesResult& result, st
   }
   std::vector<Eigen::VectorXd> values;
   for (const std::size_t k : cases) values.push_back(result.cases[k].shown().facts.value);
+  if (std::ranges::any_of(values, [&](const Eigen::VectorXd& v) { return v.size() != values[0].size(); })) {
+    r.missing = fmt::format("the runs of '{}' have quantities of several sizes", series.name);
+    return r;
+  }
   const auto limit = richardson(size.h, values, order);
   if (!limit) {
     r.missing = fmt::format("no extrapolation of '{}': {}", series.name,

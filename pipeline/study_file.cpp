@@ -225,6 +225,7 @@ std::vector<Axis> read_axes(Table& table) {
         settings.push_back({leaf.key, toml_text(*leaf.node), row.place(*leaf.node)});
         made += (made.empty() ? "" : ", ") + tail(leaf.key) + " = " + settings.back().value;
       }
+      if (made.empty()) made = "as it is";
       axis.entries.emplace_back(label.empty() ? made : label, settings);
     }
     axes.push_back(std::move(axis));

@@ -284,7 +284,7 @@ std::string study_csv(const Study& study, const StudyResult& result) {
                                        exact(f.wall_seconds),
                                        name(run.status),
                                        unit_of(series, f),
-                                       r.reference.size() > 0 ? exact(r.uncertainty) : "",
+                                       r.reference.size() > 0 && r.uncertainty >= 0 ? exact(r.uncertainty) : "",
                                        study.name,
                                        series.name,
                                        series.cases[k].label,

@@ -240,7 +240,7 @@ void classify(StudyRun& run, const fs::path& log, const ProcessLimits& limits) {
     run.cause = fmt::format("killed by signal {} ({})", p.code, strsignal(p.code));
     return;
   }
-  constexpr int exit_time_limit = 7;
+  constexpr int out_of_time = 7;  // design.md: stopped by a time limit
   switch (p.code) {
     case exit_ok:
       run.status = RunStatus::ok;
@@ -254,7 +254,7 @@ void classify(StudyRun& run, const fs::path& log, const ProcessLimits& limits) {
       run.status = RunStatus::refused;
       return;
     case exit_solver:
-    case exit_time_limit:
+    case out_of_time:
       run.status = RunStatus::stopped;
       return;
     default:

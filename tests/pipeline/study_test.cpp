@@ -174,6 +174,8 @@ TEST(Study, TheFinestRunAndRichardsonStateTheirUncertainty) {
   json series = lab.result()["series"][0];
   EXPECT_NEAR(series["reference"]["value"][0], 3.01, 1e-12);
   EXPECT_NEAR(series["reference"]["uncertainty"], 0.03, 1e-12);
+  ASSERT_EQ(lab.run(depth + "reference.kind = \"finest\"\nvary.solver.dt = [0.4]\n"), 0);
+  EXPECT_EQ(lab.result()["series"][0]["reference"]["uncertainty"], nullptr) << "unknown is not zero";
   ASSERT_EQ(lab.run(depth + "reference.kind = \"richardson\"\nvary.solver.dt = [0.4, 0.2, 0.1, 0.05]\n"), 0);
   series = lab.result()["series"][0];
   EXPECT_NEAR(series["reference"]["value"][0], 3, 1e-9);
