@@ -26,6 +26,7 @@
 #include "pipeline/inspect.h"
 #include "pipeline/json_text.h"
 #include "pipeline/scene.h"
+#include "pipeline/study.h"
 #include "pipeline/templates.h"
 #include "pipeline/units.h"
 #include "pipeline/version.h"
@@ -175,6 +176,17 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
   return r.exact() ? exit_ok : exit_check;
 }
 
+int run_study_file(const std::string& input, const std::string& directory, const Common& common, Console& console) {
+  StudyOptions options;
+  // Each run is this very program.
+  options.program = std::filesystem::read_symlink("/proc/self/exe");
+  if (!directory.empty()) options.directory = directory;
+  options.overwrite = common.overwrite;
+  options.json = common.json;
+  options.threads = common.threads;
+  return run_study(read_study(input), options, console);
+}
+
 int run_init(const std::string& name, const std::string& directory, const Common& common, Console& console) {
   if (name.empty()) {
     for (const SceneTemplate& t : scene_templates()) fmt::print("{:8} {}\n", t.name, t.about);
@@ -277,6 +289,12 @@ int run_command(int argc, char** argv) {
   check_command->add_option("SCENE", check_arguments.input)->required();
   check_command->add_option("--set", check_arguments.settings, "key.path=value")->take_all()->allow_extra_args(false);
 
+  std::string study_input, study_directory;
+  CLI::App* study_command =
+      app.add_subcommand("study", "Run a scene many times: errors against time, stability tables");
+  study_command->add_option("STUDY", study_input, "study.toml")->required();
+  study_command->add_option("-o,--output", study_directory, "Directory of the results (default: out/<study name>)");
+
   std::string template_name, template_directory;
   CLI::App* init_command = app.add_subcommand("init", "Write a scene to start from; without a name, list them");
   init_command->add_option("TEMPLATE", template_name);
@@ -284,8 +302,8 @@ int run_command(int argc, char** argv) {
 
   CLI::App* presets_command = app.add_subcommand("presets", "Fabrics that need no table in the scene");
 
-  for (CLI::App* command :
-       {drape_command, inspect_command, roundtrip_command, check_command, init_command, presets_command}) {
+  for (CLI::App* command : {drape_command, inspect_command, roundtrip_command, check_command, study_command,
+                            init_command, presets_command}) {
     add_common(*command, common);
   }
 
@@ -309,6 +327,7 @@ int run_command(int argc, char** argv) {
         throw UsageError("check takes a scene.toml");
       return check_scene(scene_of(check_arguments), common.json, console);
     }
+    if (*study_command) return run_study_file(study_input, study_directory, common, console);
     if (*init_command) return run_init(template_name, template_directory, common, console);
     if (*presets_command) return run_presets(common);
   } catch (const UsageError& error) {

@@ -90,6 +90,8 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
     nominal.push_back(at.nominal);
     second_pk.emplace_back(at.second_pk.head<2>());
     reach(at.position);
+    const Eigen::Vector3d start = model.state(s.panel, s.uv.x(), s.uv.y(), build.start).position;
+    m.largest_deflection = std::max(m.largest_deflection, (at.position - start).norm());
   }
   m.strain = extremes(strain, samples);
   m.nominal = extremes(nominal, samples);

@@ -24,6 +24,39 @@ Json measured(double value, const char* unit) {
   return {{"value", value}, {"unit", unit}};
 }
 
+Json panel_json(const BuiltPanel& panel) {
+  const NurbsSurface& s = panel.face.surface;
+  const KnotMesh& mesh = panel.topology.mesh;
+  const auto cells = [&](CellKind kind) { return std::ranges::count(panel.topology.cells, kind); };
+  return {
+      {"name", panel.name},
+      {"degree", {s.u().degree(), s.v().degree()}},
+      {"spans", {mesh.u.size() - 1, mesh.v.size() - 1}},
+      {"control_points", {s.count_u(), s.count_v()}},
+      {"cells",
+       {{"inside", cells(CellKind::inside)}, {"cut", cells(CellKind::cut)}, {"outside", cells(CellKind::outside)}}}};
+}
+
+// What studies look at by name. A number that doesn't exist (nothing fell, so nothing can be compared with its work)
+// is left out.
+Json measures_json(const RunResult& run, const StateMeasures& m) {
+  Json measures = {{"area", measured(m.area, "m2")},
+                   {"mass", measured(m.mass, "kg")},
+                   {"lowest", measured(m.lowest, "m")},
+                   {"highest", measured(m.highest, "m")},
+                   {"largest_deflection", measured(m.largest_deflection, "m")},
+                   {"strain_max", measured(m.strain.max.maxCoeff(), "1")},
+                   {"strain_min", measured(m.strain.min.minCoeff(), "1")},
+                   {"strain_p999", measured(m.strain.p999.maxCoeff(), "1")},
+                   {"strain_mean_abs", measured(m.strain.mean_abs.mean(), "1")}};
+  const double fall = -run.energy.gravity;
+  if (fall > 0) measures["injected_over_gravity_work"] = measured(run.energy.injected / fall, "1");
+  for (std::size_t k = 0; k < m.points.size(); ++k) {
+    measures["point_" + std::to_string(k)] = {{"value", array(m.points[k])}, {"unit", "m"}};
+  }
+  return measures;
+}
+
 }  // namespace
 
 Json report_json(const Build& build, const RunResult& run, const StateMeasures& m, double write_seconds) {
@@ -34,6 +67,10 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["version"] = version();
   report["exit"] = name(run.exit);
   if (run.exit != RunExit::ok) report["reason"] = run.reason;
+  report["model"] = "shell";
+  report["scheme"] = "verlet";
+  report["panels"] = Json::array();
+  for (const BuiltPanel& panel : build.panels) report["panels"].push_back(panel_json(panel));
   report["frames"] = run.frames;
   report["steps"] = run.steps;
   report["redone_steps"] = run.redone_steps;
@@ -68,6 +105,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"mean_abs_weft", m.strain.mean_abs[0]},
                       {"mean_abs_warp", m.strain.mean_abs[1]},
                       {"at_constraints_max", m.at_constraints_max}};
+  if (scene.strain_limit.on) report["strain"]["limit"] = scene.strain_limit.tolerance;
   report["points"] = Json::array();
   for (std::size_t k = 0; k < m.points.size(); ++k) {
     report["points"].push_back(
@@ -113,10 +151,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   for (const std::string& w : build.warnings) warnings.push_back(w);
   for (const std::string& w : run.warnings) warnings.push_back(w);
   report["warnings"] = warnings;
-  report["measures"] = {{"area", measured(m.area, "m2")},
-                        {"mass", measured(m.mass, "kg")},
-                        {"lowest", measured(m.lowest, "m")},
-                        {"highest", measured(m.highest, "m")}};
+  report["measures"] = measures_json(run, m);
   return report;
 }
 

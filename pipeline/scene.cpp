@@ -2,12 +2,6 @@
 
 #include <fmt/format.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wconversion"
-#pragma GCC diagnostic ignored "-Wshadow"
-#include <toml++/toml.h>
-#pragma GCC diagnostic pop
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cctype>
@@ -18,225 +12,13 @@
 #include "geometry/error.h"
 #include "io/file.h"
 #include "io/iges.h"
+#include "pipeline/toml_table.h"
 #include "pipeline/units.h"
 
 namespace toile {
 namespace {
 
 constexpr double degree_in_radians = std::numbers::pi / 180;
-
-int edit_distance(std::string_view a, std::string_view b) {
-  std::vector<int> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = static_cast<int>(j);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    int diagonal = row[0];
-    row[0] = static_cast<int>(i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const int replaced = diagonal + (a[i - 1] != b[j - 1]);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row[b.size()];
-}
-
-// "; did you mean 'grain_deg'?", or the list of what is possible.
-std::string suggestion(std::string_view word, const std::vector<std::string>& possible) {
-  const std::string* best = nullptr;
-  int distance = std::max(2, static_cast<int>(word.size()) / 3);
-  for (const std::string& p : possible) {
-    const int d = edit_distance(word, p);
-    if (d <= distance && (!best || d < distance)) {
-      best = &p;
-      distance = d;
-    }
-  }
-  if (best) return fmt::format("; did you mean '{}'?", *best);
-  return fmt::format("; possible are {}", fmt::join(possible, ", "));
-}
-
-const char* type_name(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "an array";
-    case toml::node_type::string:
-      return "a string";
-    case toml::node_type::integer:
-      return "a whole number";
-    case toml::node_type::floating_point:
-      return "a number";
-    case toml::node_type::boolean:
-      return "true or false";
-    default:
-      return "a date or time";
-  }
-}
-
-enum class Range { any, nonnegative, positive };
-
-// Keys of one table, each asked for by name; what nobody asked for is an error.
-class Table {
- public:
-  Table(const toml::table& table, std::string name, std::string file)
-      : table_(table), name_(std::move(name)), file_(std::move(file)) {}
-
-  const toml::node* find(const std::string& key) {
-    known_.push_back(key);
-    return table_.get(key);
-  }
-
-  std::string place(const toml::node& node) const {
-    const auto line = node.source().begin.line;
-    return line > 0 ? fmt::format("{}:{}", file_, line) : file_ + " (--set)";
-  }
-  std::string where() const { return place(table_); }
-  [[noreturn]] void fail(const toml::node& node, const std::string& what) const {
-    throw InputError(place(node) + ": " + what);
-  }
-  [[noreturn]] void missing(const std::string& key, const std::string& what) const {
-    throw InputError(fmt::format("{}: {} needs {} ({})", where(), name_, key, what));
-  }
-  std::string label(const std::string& key) const { return fmt::format("{} in {}", key, name_); }
-
-  double quantity(const toml::node& node, const std::string& what, const Dimension& dimension, Range range,
-                  double bare_unit = 1) {
-    double value = 0;
-    if (node.is_integer() || node.is_floating_point()) {
-      value = bare_unit * *node.value<double>();
-    } else if (const auto text = node.value<std::string>(); text && node.is_string()) {
-      try {
-        value = parse_quantity(*text, dimension);
-      } catch (const InputError& error) {
-        fail(node, fmt::format("{}: {}", what, error.what()));
-      }
-    } else {
-      fail(node,
-           fmt::format("{} must be {} or a string with a unit, not {}", what, expected(dimension), type_name(node)));
-    }
-    if (!std::isfinite(value)) fail(node, fmt::format("{} must be finite", what));
-    if (range == Range::positive && !(value > 0)) fail(node, fmt::format("{} is {}, must be positive", what, value));
-    if (range == Range::nonnegative && value < 0)
-      fail(node, fmt::format("{} is {}, must not be negative", what, value));
-    return value;
-  }
-  std::optional<double> number(const std::string& key, const Dimension& dimension, Range range, double bare_unit = 1) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    return quantity(*node, label(key), dimension, range, bare_unit);
-  }
-  void number(double& target, const std::string& key, const Dimension& dimension, Range range, double bare_unit = 1) {
-    if (const auto value = number(key, dimension, range, bare_unit)) target = *value;
-  }
-  template <int N>
-  std::optional<Eigen::Matrix<double, N, 1>> vector(const std::string& key, const Dimension& dimension,
-                                                    double bare_unit = 1) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    const toml::array* array = node->as_array();
-    if (!array || array->size() != N) {
-      fail(*node, fmt::format("{} must be an array of {} numbers ({})", label(key), N, unit_name(dimension)));
-    }
-    Eigen::Matrix<double, N, 1> result;
-    for (int i = 0; i < N; ++i) {
-      result[i] = quantity((*array)[static_cast<std::size_t>(i)], fmt::format("entry {} of {}", i, label(key)),
-                           dimension, Range::any, bare_unit);
-    }
-    return result;
-  }
-  std::optional<int> integer(const std::string& key, int least, int most) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    return integer(*node, label(key), least, most);
-  }
-  int integer(const toml::node& node, const std::string& what, int least, int most) {
-    const auto value = node.is_integer() ? node.value<std::int64_t>() : std::nullopt;
-    if (!value) fail(node, fmt::format("{} must be a whole number, not {}", what, type_name(node)));
-    if (*value < least || *value > most)
-      fail(node, fmt::format("{} is {}, must be {} to {}", what, *value, least, most));
-    return static_cast<int>(*value);
-  }
-  std::optional<std::array<int, 2>> integers(const std::string& key, int least, int most) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    const toml::array* array = node->as_array();
-    if (!array || array->size() != 2) fail(*node, fmt::format("{} must be two whole numbers [u, v]", label(key)));
-    return std::array<int, 2>{integer((*array)[0], label(key), least, most),
-                              integer((*array)[1], label(key), least, most)};
-  }
-  std::optional<std::string> string(const std::string& key) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    if (!node->is_string()) fail(*node, fmt::format("{} must be a string, not {}", label(key), type_name(*node)));
-    return *node->value<std::string>();
-  }
-  std::optional<bool> boolean(const std::string& key) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    if (!node->is_boolean()) fail(*node, fmt::format("{} must be true or false, not {}", label(key), type_name(*node)));
-    return *node->value<bool>();
-  }
-  // One of `now`; those of `later` are refused with a reason of their own.
-  std::optional<std::string> choice(const std::string& key, const std::vector<std::string>& now,
-                                    const std::vector<std::string>& later) {
-    const auto value = string(key);
-    if (!value) return std::nullopt;
-    const toml::node& node = *table_.get(key);
-    if (std::ranges::find(later, *value) != later.end()) {
-      fail(node, fmt::format("{} = \"{}\" is not supported by this version; use {}", label(key), *value,
-                             fmt::join(now, " or ")));
-    }
-    if (std::ranges::find(now, *value) == now.end()) {
-      fail(node, fmt::format("unknown {} \"{}\"{}", label(key), *value, suggestion(*value, now)));
-    }
-    return value;
-  }
-  std::optional<Table> table(const std::string& key, const std::string& name) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    return as_table(*node, name);
-  }
-  Table as_table(const toml::node& node, const std::string& name) const {
-    if (!node.is_table()) fail(node, fmt::format("{} must be a table, not {}", name, type_name(node)));
-    return Table(*node.as_table(), name, file_);
-  }
-  // The tables of an array of tables.
-  std::vector<Table> tables(const std::string& key, const std::string& name) {
-    const toml::node* node = find(key);
-    if (!node) return {};
-    const toml::array* array = node->as_array();
-    if (!array) fail(*node, fmt::format("{} must be an array of tables: write {}", key, name));
-    std::vector<Table> result;
-    for (const toml::node& entry : *array) result.push_back(as_table(entry, name));
-    return result;
-  }
-  void refuse(const std::string& key, const std::string& why) {
-    const toml::node* node = find(key);
-    known_.pop_back();
-    if (node) fail(*node, why);
-  }
-
-  const toml::table& raw() const { return table_; }
-  void done() const {
-    for (const auto& [key, node] : table_) {
-      const std::string_view name = key.str();
-      if (std::ranges::find(known_, name) != known_.end()) continue;
-      const auto line = key.source().begin.line;
-      const std::string at = line > 0 ? fmt::format("{}:{}", file_, line) : file_ + " (--set)";
-      throw InputError(fmt::format("{}: unknown key '{}' in {}{}", at, name, name_, suggestion(name, known_)));
-    }
-  }
-
- private:
-  static std::string expected(const Dimension& dimension) {
-    return dimension == dimension::none ? "a number" : fmt::format("a number in {}", unit_name(dimension));
-  }
-
-  const toml::table& table_;
-  std::string name_, file_;
-  std::vector<std::string> known_;
-};
 
 std::string stem_of(const std::string& name, std::string_view suffix) {
   return name.substr(0, name.size() - suffix.size());
@@ -748,12 +530,7 @@ Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vec
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
   refuse_deep_keys(text, path.string());
-  toml::table root;
-  try {
-    root = toml::parse(text, path.string());
-  } catch (const toml::parse_error& error) {
-    throw InputError(fmt::format("{}:{}: {}", path.string(), error.source().begin.line, error.description()));
-  }
+  toml::table root = parse_toml(text, path);
   return read_tables(root, path, settings);
 }
 

@@ -325,6 +325,40 @@ TEST(Program, ACheckpointThatDoesNotFitIsExit3AndLeavesNoFile) {
   EXPECT_EQ(toile(folder, "drape scene.toml -o whole --resume first/checkpoint").code, 8) << "another run's folder";
 }
 
+TEST(Program, AStudyRunsThisProgram) {
+  const Small folder("study");
+  write_file(folder / "study.toml",
+             "scene = \"scene.toml\"\nquantity.of = \"lowest\"\nreference.kind = \"finest\"\n"
+             "limits.megabytes = 1e9  # sanitizers reserve address space\n"
+             "vary.panel.0.refine.spans = [[5, 5], [10, 10]]\n");
+  const Outcome run = toile(folder, "study study.toml -o result");
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.out.find("reference of"), std::string::npos) << run.out;
+  const std::string csv = read_file(folder / "result/study.csv");
+  EXPECT_NE(csv.find("\nshell,verlet,cut,2,5x5,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find("\nshell,verlet,cut,2,10x10,"), std::string::npos) << csv;
+  const Outcome again = toile(folder, "study study.toml -o result --json");
+  EXPECT_EQ(nlohmann::json::parse(again.out)["series"][0]["cases"].size(), 2u);
+  EXPECT_NE(again.err.find("2 of 2 runs are from an earlier call"), std::string::npos) << again.err;
+  EXPECT_EQ(toile(folder, "study none.toml").code, 3);
+}
+
+TEST(Program, AnInterruptedStudyGoesOnLater) {
+  const Small folder("study_interrupt");
+  write_file(folder / "study.toml",
+             "scene = \"scene.toml\"\nquantity.of = \"lowest\"\nreference.kind = \"finest\"\n"
+             "limits.megabytes = 1e9\nvary.solver.until = [0.01, 100000]\n[set]\noutput.every = 1\n");
+  const std::string command = "cd '" + folder.path().string() +
+                              "' && timeout --preserve-status -s INT 2 '" TOILE_PROGRAM
+                              "' study study.toml -o result >stdout.txt 2>stderr.txt";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130) << read_file(folder / "stderr.txt");
+  const std::string csv = read_file(folder / "result/study.csv");
+  EXPECT_NE(csv.find(",ok,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find(",not run,"), std::string::npos) << csv;
+}
+
 TEST(Program, TemplatesRunAtOnce) {
   const Small folder("init");
   for (const std::string name : {"hang", "skirt"}) {
