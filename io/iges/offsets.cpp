@@ -50,6 +50,7 @@ FileSurface to_surface(const OffsetSurface& offset, const FileSurface& base, dou
   const Eigen::Vector3d middle = normal(s, 0.5 * (u.min + u.max), 0.5 * (v.min + v.max));
   if (middle.dot(offset.indicator) < 0) distance = -distance;
   FileSurface out = base;
+  out.plane.reset();
   const double size = (s.points().rowwise().maxCoeff() - s.points().rowwise().minCoeff()).norm();
   if (affine_patch(s, 1e-12 * size)) {
     out.surface = s.with_points(s.points().colwise() + distance * middle);

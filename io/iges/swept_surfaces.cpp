@@ -1,6 +1,7 @@
 // Entities 118 (ruled surface), 120 (surface of revolution), 122 (tabulated cylinder). [IGES 5.3, 4.17, 4.18, 4.19]
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "geometry/error.h"
@@ -40,7 +41,7 @@ NaturalCurve joined(const std::vector<NaturalCurve>& pieces, double tolerance) {
       weights.push_back(ratio * c.weight(i));
     }
     for (const Turn& turn : piece.turns)
-      out.turns.push_back({{turn.range.min + shift, turn.range.max + shift}, turn.arcs});
+      out.turns.push_back({{turn.range.min + shift, turn.range.max + shift}, turn.arcs, turn.sweep});
     at += own.length();
   }
   Eigen::Matrix3Xd net(3, static_cast<Eigen::Index>(points.size()));
@@ -62,14 +63,16 @@ UnitCurve over_unit(const NaturalCurve& c) {
   UnitCurve out{with_domain(clamp(c.curve), {0, 1}), {}};
   for (const Turn& turn : c.turns)
     out.map.turns.push_back(
-        {{(turn.range.min - d.min) / d.length(), (turn.range.max - d.min) / d.length()}, turn.arcs});
+        {{(turn.range.min - d.min) / d.length(), (turn.range.max - d.min) / d.length()},
+                              turn.arcs,
+                              turn.sweep});
   return out;
 }
 
 bool same(const std::vector<Turn>& a, const std::vector<Turn>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Turn& x, const Turn& y) {
     return std::abs(x.range.min - y.range.min) <= 1e-12 && std::abs(x.range.max - y.range.max) <= 1e-12 &&
-           x.arcs == y.arcs;
+           x.arcs == y.arcs && std::abs(x.sweep - y.sweep) <= 1e-12;
   });
 }
 
@@ -113,7 +116,14 @@ class ArcLength {
       }
     if (!(s_.back() > 0)) throw GeometryError("a curve of the ruled surface has no length");
   }
-  double parameter(double fraction) const {
+  double parameter(double fraction) {
+    const auto [known, added] = known_.try_emplace(fraction, 0.0);
+    if (added) known->second = find(fraction);
+    return known->second;
+  }
+
+ private:
+  double find(double fraction) const {
     const double s = fraction * s_.back();
     const auto above = static_cast<std::size_t>(std::lower_bound(s_.begin(), s_.end(), s) - s_.begin());
     if (above == 0) return t_.front();
@@ -130,9 +140,9 @@ class ArcLength {
     return t;
   }
 
- private:
   const Curve3& curve_;
   std::vector<double> t_, s_;
+  std::map<double, double> known_;  // a fit asks for the same fractions again and again
 };
 
 bool constant_speed(const NaturalCurve& c) {
@@ -188,7 +198,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
     length_a.emplace(a.curve);
     length_b.emplace(b.curve);
   }
-  const auto at = [](const UnitCurve& curve, const std::optional<ArcLength>& length, double u) {
+  const auto at = [](const UnitCurve& curve, std::optional<ArcLength>& length, double u) {
     return curve.curve(length ? length->parameter(u) : curve.map(u));
   };
   std::vector<FitBreak> breaks{{0, 0}, {1, 0}};
@@ -262,7 +272,7 @@ FileSurface to_surface(const Revolution& revolution, const Curve3& axis, const N
   out.surface = revolved(clamp(generatrix.curve), axis.start(), direction, angle);
   out.maps[0].u.turns = generatrix.turns;
   const int arcs = (out.surface.count_v() - 1) / 2;
-  out.maps[0].v.turns = {{angle, arcs}};
+  out.maps[0].v.turns = {{angle, arcs, angle.length()}};
   out.how = "surface of revolution as rational B-spline surface";
   return out;
 }
