@@ -18,6 +18,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+constexpr double believable = 1e-2;  // of the surface's size: model curves further off it bound something else
 constexpr double usable = 1e-3;  // of the domain; gaps and excursions beyond it are refused by validation
 
 Vector2d first(const TrimCurve& c) {
@@ -344,6 +345,7 @@ class FaceMaker {
       }
       PullBackOptions options;
       options.snap = snap_;
+      options.max_distance = believable;
       options.start = start;
       PulledCurve c = pull_back(s_, m, options);
       start = c.curve.end();
@@ -421,7 +423,7 @@ class FaceMaker {
       const Fit old = own.empty() ? Fit{1, 1} : fit_of(own);
       const bool better =
           std::max(fit.gap, fit.excursion) < std::max(old.gap, old.excursion) || (fit.good() && p.distance < 0.5 * off);
-      if (p.distance <= 1e-2 * size_ && (better || own.empty())) {
+      if (p.distance <= believable * size_ && (better || own.empty())) {
         note(b, "pulled back",
              trouble + "; its model curves are pulled back onto the surface, " +
                  (p.error > 0 ? "off by " + format_real(p.error) : std::string("exactly")) +

@@ -112,7 +112,7 @@ class ArcLength {
     for (std::size_t i = 0; i + 1 < breaks.size(); ++i)
       for (int k = 1; k <= 16; ++k) {
         t_.push_back(k == 16 ? breaks[i + 1] : breaks[i] + (breaks[i + 1] - breaks[i]) * k / 16);
-        s_.push_back(s_.back() + arc_length(curve, {t_[t_.size() - 2], t_.back()}));
+        s_.push_back(s_.back() + arc_length(curve, {t_[t_.size() - 2], t_.back()}, tolerance));
       }
     if (!(s_.back() > 0)) throw GeometryError("a curve of the ruled surface has no length");
   }
@@ -133,13 +133,14 @@ class ArcLength {
     for (int k = 0; k < 20; ++k) {
       const double speed = evaluate(curve_, t).d1.norm();
       if (!(speed > 0)) break;
-      const double step = (s - s_[above - 1] - arc_length(curve_, {a, t})) / speed;
+      const double step = (s - s_[above - 1] - arc_length(curve_, {a, t}, tolerance)) / speed;
       t = std::clamp(t + step, a, b);
-      if (std::abs(step) <= 1e-14 * (b - a)) break;
+      if (std::abs(step) <= 1e-12 * (b - a)) break;
     }
     return t;
   }
 
+  static constexpr double tolerance = 1e-9;  // far below what files resolve
   const Curve3& curve_;
   std::vector<double> t_, s_;
   std::map<double, double> known_;  // a fit asks for the same fractions again and again
@@ -211,7 +212,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
   }
   const SurfaceFit fit = fit_surface(
       [&](double u, double v) -> Eigen::Vector3d { return (1 - v) * at(a, length_a, u) + v * at(b, length_b, u); },
-      breaks, {{0, 0}, {1, 0}}, tolerance);
+      breaks, {{0, 0}, {1, 0}}, tolerance, by_length ? 64 : 256);
   out.surface = fit.surface;
   out.error = fit.error;
   return out;
