@@ -162,7 +162,7 @@ class FaceMaker {
   // The standard's reading of the file's parameters, unless another lies nearer to the model curves.
   const ParameterMap& best_map() const {
     if (file_.maps.size() == 1) return file_.maps[0];
-    const ParameterMap* best = nullptr;
+    const ParameterMap* best = &file_.maps[0];
     double least = std::numeric_limits<double>::infinity();
     bool seen = false;
     for (const ParameterMap& map : file_.maps) {

@@ -212,7 +212,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
   }
   const SurfaceFit fit = fit_surface(
       [&](double u, double v) -> Eigen::Vector3d { return (1 - v) * at(a, length_a, u) + v * at(b, length_b, u); },
-      breaks, {{0, 0}, {1, 0}}, tolerance, by_length ? 64 : 256);
+      breaks, {{0, 0}, {1, 0}}, tolerance, by_length ? 64 : 128);
   out.surface = fit.surface;
   out.error = fit.error;
   return out;

@@ -252,6 +252,14 @@ TEST(IgesFaces, IdleControlPointsOfSurplusKnotsAreLeftOut) {
   EXPECT_TRUE(has_warning(file, "entity 128: a knot occurs more often than the degree"));
 }
 
+// Found by mutation: a line that swallowed the next one gives an entry a record of another type.
+TEST(IgesFaces, ARecordOfAnotherTypeIsQuarantinedAndStaysSoWhenRewritten) {
+  const PanelFile file = read_corpus("record_of_another_type");
+  EXPECT_EQ(file.panels.size(), 2u);
+  EXPECT_TRUE(has_warning(file, "the parameter record says '102', must be 142"));
+  EXPECT_TRUE(roundtrip(file, IgesMode::rewrite).exact());
+}
+
 TEST(IgesFaces, JunkInFieldsThatNobodyNeedsDoesNoHarm) {
   expect_near_rel(areas("junk_fields").at(0), 6400, 1e-13);
 }

@@ -15,7 +15,7 @@ std::string new_faces(const toile::PanelFile& file) {
   for (const toile::TrimmedSurface& panel : file.panels) faces.push_back({panel, panel.name, 0, {}});
   toile::IgesHeader header;
   header.unit = file.unit;
-  header.resolution = file.resolution;
+  if (file.resolution > 0) header.resolution = file.resolution;
   return toile::format_iges(faces, header).text;
 }
 
