@@ -1,5 +1,6 @@
 // Entity 126, rational B-spline curve. [IGES 5.3, 4.23]
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -74,6 +75,7 @@ SplineCurve read_spline_curve(Parameters& in) {
       points.conservativeResize(3, points.cols() - 1);
       if (!weights.empty()) weights.erase(weights.begin() + *i);
     }
+    if (std::all_of(weights.begin(), weights.end(), [](double w) { return w == 1; })) weights.clear();
   }
   try {
     SplineCurve out;

@@ -41,7 +41,8 @@ void drop_surplus_rows(Parameters& in, int m1, int m2, std::vector<double>& knot
   if (weights.empty()) return;
   std::vector<double> left;
   for (const int k : kept) left.push_back(weights[static_cast<std::size_t>(k)]);
-  weights = std::move(left);
+  const bool plain = std::all_of(left.begin(), left.end(), [](double w) { return w == 1; });
+  weights = plain ? std::vector<double>() : std::move(left);
 }
 
 }  // namespace
