@@ -146,12 +146,16 @@ int run_inspect(const InspectArguments& a, const Common& common, Console& consol
   } else {
     fmt::print("{}", inspect_text(inspection));
   }
-  return exit_ok;
+  for (const std::string& panel : inspection.refused) console.error(panel);
+  return inspection.refused.empty() ? exit_ok : exit_geometry;
 }
 
 int run_roundtrip(const std::string& input, bool rewrite, const Common& common) {
-  const RoundtripReport r = roundtrip(read_iges(input), rewrite ? IgesMode::rewrite : IgesMode::replay);
+  const PanelFile file = read_iges(input);
+  const RoundtripReport r = roundtrip(file, rewrite ? IgesMode::rewrite : IgesMode::replay);
   if (common.json) {
+    nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
+    for (const std::string& warning : file.warnings) warnings.push_back(utf8(warning));
     const nlohmann::ordered_json out = {{"file", input},
                                         {"mode", rewrite ? "rewrite" : "replay"},
                                         {"exact", r.exact()},
@@ -163,7 +167,9 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
                                         {"weights_equal", r.weights_equal},
                                         {"points_equal", r.points_equal},
                                         {"parameter_curves_equal", r.parameter_curves_equal},
-                                        {"differences", r.differences}};
+                                        {"differences", r.differences},
+                                        {"warnings", warnings},
+                                        {"ledger", ledger_json(file.ledger)}};
     fmt::print("{}\n", json_text(out));
   } else {
     fmt::print(
@@ -172,6 +178,8 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
         r.knots_equal ? "equal" : "DIFFER", r.weights_equal ? "equal" : "DIFFER", r.points_equal ? "equal" : "DIFFER",
         r.parameter_curves_equal ? "equal" : "DIFFER");
     for (const std::string& difference : r.differences) fmt::print("  {}\n", difference);
+    fmt::print("{}", ledger_text(file.ledger));
+    for (const std::string& warning : file.warnings) fmt::print("  warning     {}\n", warning);
   }
   return r.exact() ? exit_ok : exit_check;
 }

@@ -68,6 +68,31 @@ int active_control_points(const NurbsSurface& surface, const TrimTopology& topol
   return static_cast<int>(std::ranges::count(active, true));
 }
 
+// One line for each loop and kind of repair ("snapped ...", "closed ..."): the largest of them, with its move.
+std::vector<std::string> repair_warnings(const std::vector<LoopRepair>& repairs) {
+  struct Group {
+    const LoopRepair* largest;
+    int count = 0;
+  };
+  std::vector<std::pair<std::string, Group>> groups;
+  for (const LoopRepair& repair : repairs) {
+    const std::string key = fmt::format("{} {}", repair.loop, repair.what.substr(0, repair.what.find(' ')));
+    auto group = std::ranges::find(groups, key, [](const auto& g) { return g.first; });
+    if (group == groups.end()) group = groups.insert(groups.end(), {key, {&repair}});
+    if (repair.move > group->second.largest->move) group->second.largest = &repair;
+    ++group->second.count;
+  }
+  std::vector<std::string> out;
+  for (const auto& [key, group] : groups) {
+    const LoopRepair& repair = *group.largest;
+    out.push_back(fmt::format("loop {}: {} at (u, v) = ({}, {})", repair.loop, repair.what, repair.place.x(),
+                              repair.place.y()));
+    if (repair.move > 0) out.back() += fmt::format(", by {:.2g}", repair.move);
+    if (group.count > 1) out.back() += fmt::format("; {} such, this the largest move", group.count);
+  }
+  return out;
+}
+
 InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& options) {
   InspectedPanel panel;
   panel.face = source;
@@ -75,9 +100,8 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   for (const TrimLoop& loop : panel.face.loops) panel.gaps.emplace_back(loop.index, gap(loop));
   const std::string who = fmt::format("panel '{}'", panel.face.name);
   panel.repairs = validate_loops(panel.face);
-  for (const LoopRepair& repair : panel.repairs) {
-    panel.warnings.push_back(fmt::format("{}: loop {}: {} at (u, v) = ({}, {})", who, repair.loop, repair.what,
-                                         repair.place.x(), repair.place.y()));
+  for (std::string& warning : repair_warnings(panel.repairs)) {
+    panel.warnings.push_back(fmt::format("{}: {}", who, std::move(warning)));
   }
   panel.topology = trace_trims(panel.face);
   panel.points = constraint_points(panel.face, panel.topology);
@@ -243,15 +267,67 @@ Inspection inspect(const PanelFile& file, const InspectOptions& options) {
   out.exporter = file.exporter;
   out.entities = file.entities;
   out.warnings = file.warnings;
-  for (const LedgerEntry& entry : file.ledger) {
-    if (entry.disposition == Disposition::converted || entry.disposition == Disposition::quarantined) {
-      out.ledger.push_back(entry);
-    }
-  }
+  out.ledger = file.ledger;
   for (const TrimmedSurface& face : file.panels) {
-    out.panels.push_back(inspect(face, options));
+    try {
+      out.panels.push_back(inspect(face, options));
+    } catch (const GeometryError& error) {
+      if (file.panels.size() == 1) throw;
+      out.refused.emplace_back(error.what());
+      continue;
+    }
     const auto& warnings = out.panels.back().warnings;
     out.warnings.insert(out.warnings.end(), warnings.begin(), warnings.end());
+  }
+  if (out.panels.empty() && !out.refused.empty()) throw GeometryError(out.refused.front());
+  return out;
+}
+
+namespace {
+
+const char* name(Disposition disposition) {
+  switch (disposition) {
+    case Disposition::read: return "read";
+    case Disposition::converted: return "converted";
+    case Disposition::kept: return "kept as it is";
+    case Disposition::quarantined: return "quarantined";
+  }
+  return "";
+}
+
+}  // namespace
+
+nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (const LedgerEntry& entry : ledger) {
+    nlohmann::ordered_json row = {{"entry", entry.sequence},
+                                  {"line", entry.line},
+                                  {"entity", entry.type},
+                                  {"form", entry.form},
+                                  {"disposition", name(entry.disposition)}};
+    if (!entry.why.empty()) row["why"] = utf8(entry.why);
+    out.push_back(std::move(row));
+  }
+  return out;
+}
+
+std::string ledger_text(const std::vector<LedgerEntry>& ledger) {
+  struct Row {
+    const LedgerEntry* first = nullptr;
+    int count = 0;
+  };
+  std::map<std::pair<int, Disposition>, Row> rows;
+  for (const LedgerEntry& entry : ledger) {
+    Row& row = rows[{entry.type, entry.disposition}];
+    if (row.count++ == 0) row.first = &entry;
+  }
+  std::string out = "  entity  count  what became of it\n";
+  for (const auto& [key, row] : rows) {
+    out += fmt::format("  {:>6} {:>6}  {}", key.first, row.count, name(key.second));
+    if (!row.first->why.empty())
+      out += row.count == 1 ? fmt::format(": line {}: {}", row.first->line, row.first->why)
+                            : fmt::format(": first at line {}: {}", row.first->line, row.first->why);
+    out += '\n';
   }
   return out;
 }
@@ -263,22 +339,24 @@ nlohmann::ordered_json inspect_json(const Inspection& inspection) {
   for (const InspectedPanel& panel : inspection.panels) panels.push_back(panel_json(panel));
   nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
   for (const std::string& warning : inspection.warnings) warnings.push_back(utf8(warning));
-  return {{"file", utf8(inspection.file)},   {"unit", utf8(inspection.unit)},   {"exporter", utf8(inspection.exporter)},
-          {"warnings", std::move(warnings)}, {"entities", std::move(entities)}, {"panels", std::move(panels)}};
+  nlohmann::ordered_json refused = nlohmann::ordered_json::array();
+  for (const std::string& panel : inspection.refused) refused.push_back(utf8(panel));
+  return {{"file", utf8(inspection.file)},
+          {"unit", utf8(inspection.unit)},
+          {"exporter", utf8(inspection.exporter)},
+          {"warnings", std::move(warnings)},
+          {"entities", std::move(entities)},
+          {"panels", std::move(panels)},
+          {"refused", std::move(refused)},
+          {"ledger", ledger_json(inspection.ledger)}};
 }
 
 std::string inspect_text(const Inspection& inspection) {
   std::string out = fmt::format("{}  {}{}\n", inspection.file, inspection.unit,
                                 inspection.exporter.empty() ? "" : ", written by " + inspection.exporter);
-  out += "  entities   ";
-  for (const auto& [type, count] : inspection.entities) out += fmt::format(" {} x {}", count, type);
-  out += '\n';
-  for (const LedgerEntry& entry : inspection.ledger) {
-    out += fmt::format("  {}    line {}: entity {}: {}\n",
-                       entry.disposition == Disposition::converted ? "converted" : "left out ", entry.line, entry.type,
-                       entry.why);
-  }
+  out += ledger_text(inspection.ledger);
   for (const std::string& warning : inspection.warnings) out += "  warning     " + warning + '\n';
+  for (const std::string& panel : inspection.refused) out += "  refused     " + panel + '\n';
   for (const InspectedPanel& panel : inspection.panels) out += panel_text(panel);
   return out;
 }

@@ -38,13 +38,18 @@ struct InspectedPanel {
 struct Inspection {
   std::string file, unit, exporter;
   std::map<int, int> entities;
-  std::vector<LedgerEntry> ledger;    // what was converted or quarantined
+  std::vector<LedgerEntry> ledger;    // of every entity
   std::vector<std::string> warnings;  // of the file, then of the panels
   std::vector<InspectedPanel> panels;
+  std::vector<std::string> refused;   // panels without a valid trim: panel, loop and place
 };
 
-// Throws GeometryError where a panel has no valid trim, with panel, loop and place.
+// Throws GeometryError where no panel has a valid trim, with panel, loop and place of the first.
 Inspection inspect(const PanelFile& file, const InspectOptions& options = {});
+
+// The ledger by kind of entity and what became of it, with the first reason and its line; for programs, every entity.
+std::string ledger_text(const std::vector<LedgerEntry>& ledger);
+nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger);
 
 std::string inspect_text(const Inspection& inspection);
 nlohmann::ordered_json inspect_json(const Inspection& inspection);  // the contract of design.md

@@ -240,7 +240,9 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
   }
   const StrainLimit& limit = scene.strain_limit;
   if (limit.on) {
-    const Eigen::VectorXd mass = build.model->lumped_mass().cwiseMax(build.mass_floor);
+    // What moves together counts together: both sides of a seam, a function and those that follow it.
+    const Eigen::VectorXd shared = build.dependence * (build.dependence.transpose() * build.model->lumped_mass());
+    const Eigen::VectorXd mass = shared.cwiseMax(build.mass_floor);
     rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
     if (limit.variant == ProjectionVariant::second_order) {
       for (StrainRow& row : rows.strain) row.stiffness = limit_stiffness(build, row.panel) * row.area;

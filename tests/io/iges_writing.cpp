@@ -109,8 +109,15 @@ TEST(IgesWriting, ADrapedFaceComesBackBitForBit) {
     const PanelFile source = read_corpus(name);
     if (source.metres_per_unit != 0.001) continue;
     std::vector<OutputFace> faces;
-    for (const TrimmedSurface& panel : source.panels)
+    for (const TrimmedSurface& panel : source.panels) {
+      // A curve that alone runs against its loop is turned on writing (ALoneReversedCurveIsTurnedHeadToTail).
+      if (std::any_of(panel.loops.begin(), panel.loops.end(), [](const TrimLoop& loop) {
+            return std::any_of(loop.curves.begin(), loop.curves.end(), [](const TrimCurve& c) { return c.reversed; });
+          }))
+        continue;
       faces.push_back({bent(panel), "draped " + panel.name, 2, {{0.8, 0.2, 0.1}}});
+    }
+    if (faces.empty()) continue;
     const PanelFile back = parse_iges(format_iges(faces, header_of(source)).text, "back.igs");
     EXPECT_TRUE(back.warnings.empty()) << back.warnings[0];
     ASSERT_EQ(back.panels.size(), faces.size());
