@@ -115,20 +115,42 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
 
 }  // namespace
 
+// Edge of the square whose corners are as far from its middle as the farthest cloth is [m].
+double extent(const ShellPanel& panel) {
+  Eigen::Matrix3Xd places(3, panel.quadrature.points.size());
+  for (Eigen::Index k = 0; k < places.cols(); ++k) {
+    const Eigen::Vector2d& uv = panel.quadrature.points[static_cast<std::size_t>(k)];
+    places.col(k) = panel.rest(uv.x(), uv.y());
+  }
+  const Eigen::Vector3d middle = places.rowwise().mean();
+  return std::numbers::sqrt2 * (places.colwise() - middle).colwise().norm().maxCoeff();
+}
+
 double limit_stiffness(const Build& build, int panel) {
   const Scene& scene = build.scene;
   const StrainLimit& limit = scene.strain_limit;
   if (limit.stiffness) return *limit.stiffness;
-  // A strain of a tenth of the limit under the whole panel's weight and the largest traction.
   constexpr double reserve = 10;
   const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
-  const Eigen::Matrix3Xd& net = shell.rest.points();
-  const double length = (net.rowwise().maxCoeff() - net.rowwise().minCoeff()).norm() / std::numbers::sqrt2;
-  double load = shell.fabric.density * scene.gravity.norm() * length;
+  double load = shell.fabric.density * scene.gravity.norm() * extent(shell);
   for (const SceneTraction& traction : scene.tractions) load = std::max(load, traction.force.norm());
   const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
   const double own = std::max(shell.fabric.membrane.weft, shell.fabric.membrane.warp);
   return reserve * std::max({load / narrowest, own, shell.fabric.density});
+}
+
+// Masses of control points as strain rows weigh them: on closed panels what moves together counts together, so that a seam
+// is as stiff as any other line.
+Eigen::VectorXd row_masses(const Build& build) {
+  Eigen::VectorXd mass = build.model->lumped_mass();
+  const Eigen::VectorXd shared = build.dependence * (build.dependence.transpose() * mass);
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    if (!build.panels[k].closure.any()) continue;
+    const int first = build.model->first_control_point(static_cast<int>(k));
+    const Eigen::Index count = build.rest(static_cast<int>(k)).points().cols();
+    mass.segment(first, count) = shared.segment(first, count);
+  }
+  return mass;
 }
 
 std::unique_ptr<System> assemble(const Build& build, double t) {
@@ -240,12 +262,12 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
   }
   const StrainLimit& limit = scene.strain_limit;
   if (limit.on) {
-    // What moves together counts together: both sides of a seam, a function and those that follow it.
-    const Eigen::VectorXd shared = build.dependence * (build.dependence.transpose() * build.model->lumped_mass());
-    const Eigen::VectorXd mass = shared.cwiseMax(build.mass_floor);
+    const Eigen::VectorXd mass = row_masses(build).cwiseMax(build.mass_floor);
     rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
     if (limit.variant == ProjectionVariant::second_order) {
-      for (StrainRow& row : rows.strain) row.stiffness = limit_stiffness(build, row.panel) * row.area;
+      std::vector<double> stiffness;
+      for (std::size_t k = 0; k < build.panels.size(); ++k) stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
+      for (StrainRow& row : rows.strain) row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
     }
   }
   for (std::size_t k = 0; k < build.panels.size(); ++k) system->points[k].resize(build.panels[k].points.size());
