@@ -325,6 +325,15 @@ Build build(Scene scene) {
     shells.push_back(std::move(parts.shell));
     result.panels.push_back(std::move(parts.built));
   }
+  // A point that is held pulls hardest: strain is limited there too, wherever it lies in its cell.
+  for (const ScenePin& pin : result.scene.pins) {
+    if (pin.at.kind != Address::Kind::uv) continue;
+    BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(pin.panel))];
+    ConstraintPoint point;
+    point.u = pin.at.uv.x();
+    point.v = pin.at.uv.y();
+    panel.extra_points.push_back(point);
+  }
   result.dependence.resize(count, count);
   result.dependence.setFromTriplets(dependence.begin(), dependence.end());
   result.model = std::make_unique<ShellModel>(std::move(shells));

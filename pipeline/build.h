@@ -28,7 +28,7 @@ struct BuiltPanel {
   TrimmedSurface face;
   TrimTopology topology;
   std::vector<ConstraintPoint> points;        // the listed ones
-  std::vector<ConstraintPoint> extra_points;  // at degree 3 and above: of the projection only
+  std::vector<ConstraintPoint> extra_points;  // of the projection only: at degree 3 and above, and at pinned uv points
   std::vector<LoopRepair> repairs;
   Closure closure;                  // directions in which the surface closes on itself: glued at its seam
   std::vector<int> leader;          // per control point: the one that stands for it, see seam_leaders()

@@ -44,8 +44,7 @@ void fields(auto& archive, Like<DynamicState> auto& s) {
   archive(s.t, s.x, s.v, s.a);
 }
 void fields(auto& archive, Like<LoopState> auto& s) {
-  archive(s.assembled, s.done, s.dt_scale, s.steps_since_bound, s.scale, s.balance, s.rounding, s.kick,
-          s.tension_at_bound);
+  archive(s.assembled, s.done, s.dt_scale, s.steps_since_bound, s.scale, s.balance, s.rounding, s.kick);
 }
 void fields(auto& archive, Like<ShellModel::Cell> auto& c) {
   archive(c.panel, c.i, c.j);
@@ -57,7 +56,7 @@ void fields(auto& archive, Like<EnergyBalance> auto& e) {
   archive(e.kinetic, e.membrane, e.bending, e.limit, e.start, e.load_work, e.drag_work, e.motion_work, e.gravity, e.injected);
 }
 void fields(auto& archive, Like<ProjectionReport> auto& r) {
-  archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy, r.tension);
+  archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);
 }
 void fields(auto& archive, Like<RunState> auto& s) {
   archive(s.state, s.loop, s.frames, s.steps, s.redone_steps, s.frame_times, s.dt_min, s.dt_max, s.dt_last, s.bound,

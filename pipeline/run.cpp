@@ -20,9 +20,8 @@ double since(Clock::time_point start) {
 
 constexpr double step_safety = 0.9;                   // of the eigenvalue bound
 constexpr int steps_per_bound = 100;                  // the bound costs some 40 forces
-// The squared frequency that a taut row gives its nodes on a uniform net, over what ProjectionReport::tension says; how much
-// of the bound's eigenvalue it may grow by before the bound is asked again.
-constexpr double taut_factor = 5.4, taut_growth = 0.1;
+// A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the plan.
+constexpr double damped_scale = 0.8, smallest_damped = 0.25;
 constexpr double smallest_scale = 1.0 / 1024;         // ten halvings of the planned step
 constexpr double step_rise = 0.05, total_rise = 0.2;  // of the energy turned over
 
@@ -116,27 +115,20 @@ class Loop {
     const long asked = allocations();
     const System& system = *result_.system;
     result_.bound = bound_of(system);
-    result_.loop.tension_at_bound = result_.last_projection.tension;
     result_.bound_seconds += since(start);
     result_.allocations.bound += allocations() - asked;
   }
 
   TimeStepBound bound_of(const System& system) const {
-    Pull pull{system.projection.get(), {}};
-    if (pull.projection) pull.tensions = system.projection->tensions(result_.state.x, result_.state.t);
     return time_step_bound(*build_.model, *system.map, system.dynamic.node_mass,
-                           control_points(system, result_.state), pull);
+                           control_points(system, result_.state));
   }
   double limit_energy() const {
     const System& system = *result_.system;
     return system.projection ? system.projection->energy(result_.state.x, result_.state.t) : 0;
   }
-  bool tauter() const {
-    return taut_factor * (result_.last_projection.tension - result_.loop.tension_at_bound) > taut_growth * result_.bound.eigenvalue;
-  }
-
   void advance(double target) {
-    if (result_.loop.steps_since_bound >= steps_per_bound || (!scene_.dt && tauter())) evaluate_bound();
+    if (result_.loop.steps_since_bound >= steps_per_bound) evaluate_bound();
     const double largest = result_.loop.dt_scale * planned_step(scene_, result_.bound);
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
@@ -240,6 +232,9 @@ class Loop {
     result_.iterations_sum += report.projection.iterations;
     result_.iterations_max = std::max(result_.iterations_max, report.projection.iterations);
     if (!report.projection.converged) ++result_.unconverged_steps;
+    if (!scene_.dt && report.projection.damped && result_.loop.dt_scale > smallest_damped) {
+      result_.loop.dt_scale = std::max(smallest_damped, damped_scale * result_.loop.dt_scale);
+    }
     ++result_.steps;
     ++result_.loop.steps_since_bound;
   }

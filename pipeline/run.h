@@ -52,7 +52,6 @@ struct LoopState {
   double scale = 0, balance = 0;           // J, energy turned over; unexplained rise
   double rounding = 0;                     // J, that nobody sees
   double kick = 0;                         // J, of the last accepted step: what a smaller step may seem to gain
-  double tension_at_bound = 0;             // 1/s2, ProjectionReport::tension when the step bound was evaluated
 };
 
 // Calls of the memory allocator; warming up is among them.
@@ -100,7 +99,7 @@ struct RunHooks {
 };
 
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
-// state, evaluated anew every 100 steps and when the cloth has grown much tauter.
+// state, evaluated anew every 100 steps; where the projection had to damp, less.
 //   (1) every number of an accepted step is finite;
 //   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from step
 //       to step by no more than 5 % of the energy turned over so far, and in all by no more than 20 %, far less than an

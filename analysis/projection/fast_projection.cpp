@@ -17,6 +17,8 @@ namespace {
 constexpr int patience = 15;           // iterations without gain before giving up; dependent rows make pauses of up to 10
 constexpr double least_gain = 0.99;    // a violation above this times the best so far is no gain
 constexpr double poor_gain = 0.25;     // an iteration that leaves more than this of the residual asks for a new factor
+constexpr double no_gain = 0.5;        // an iteration that leaves more than this means that the start's gradients no longer lead there
+constexpr double damped_residual = 0.1;  // what damps anyway needn't be exact
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 
 }  // namespace
@@ -37,7 +39,7 @@ struct FastProjection::Impl {
   std::unique_ptr<Cholesky> factor;
 
   Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
-  Eigen::VectorXd scale, residual, rhs, solution;
+  Eigen::VectorXd scale, residual, rhs, solution, candidate;
   Eigen::VectorXd strain_lambda, compliance;  // compliance 0: hard
   std::vector<char> slack;                    // within the band without a force: takes no part for now
   Eigen::Matrix3Xd place_lambda, strain_impulse;
@@ -64,12 +66,16 @@ struct FastProjection::Impl {
 
   void build(const Eigen::VectorXd& node_mass);
   void begin(double t);
+  void clear();
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void point_along(const Eigen::Matrix3Xd& tangents);
   bool factorise(ProjectionReport& report);
   void correct(Eigen::Ref<Eigen::VectorXd> x);
   void push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x);
-  ProjectionReport iterate(Eigen::Ref<Eigen::VectorXd> x, bool fixed_directions);
+  // Where the rows point while iterating: as they do, giving up where that gains nothing; along the candidate's gradients,
+  // renewed where that gains nothing; or along those of each iteration.
+  enum class Directions { start, candidate, renewed };
+  ProjectionReport iterate(Eigen::Ref<Eigen::VectorXd> x, Directions directions);
 };
 
 void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
@@ -131,15 +137,19 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
 void FastProjection::Impl::begin(double t) {
   fixed_places = map.fixed_places(t);
   for (int p = 0; p < places(); ++p) targets.col(p) = rows.place[p].target(t);
-  strain_lambda.setZero();
   compliance.setZero();
+  clear();
+}
+
+void FastProjection::Impl::clear() {
+  strain_lambda.setZero();
   place_lambda.setZero();
   strain_impulse.setZero();
 }
 
 void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
   evaluate(composed, x, fixed_places, y);
-  report.strain_violation = report.place_violation = report.residual = report.energy = report.tension = 0;
+  report.strain_violation = report.place_violation = report.residual = report.energy = 0;
   report.worst_row = -1;
   for (int r = 0; r < strains(); ++r) {
     slack[r] = 0;
@@ -246,7 +256,7 @@ void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
   push(solution, x);
 }
 
-ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, bool fixed_directions) {
+ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, Directions directions) {
   ProjectionReport report;
   double best = std::numeric_limits<double>::infinity(), last = best;
   int waited = 0;
@@ -255,15 +265,20 @@ ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, bo
     measure(x, report);
     const double excess = std::max({report.strain_violation / std::max(options.tolerance, 1e-30),
                                     report.place_violation / std::max(options.place_tolerance, 1e-30),
-                                    report.residual / options.residual});
+                                    report.residual / (directions == Directions::start ? options.residual : damped_residual)});
     if (size() == 0 || (report.converged && excess <= 1 && report.iterations >= options.min_iterations)) break;
     if (report.iterations >= options.max_iterations) break;
     if (!std::isfinite(excess)) break;
     waited = excess < least_gain * best ? 0 : waited + 1;
     best = std::min(best, excess);
     if (waited >= patience) break;
-    if (!fixed_directions) point_along(y);
-    if (!fixed_directions || !factored || excess > poor_gain * last) {
+    const bool gained = excess <= no_gain * last;
+    if (directions == Directions::start && !gained) break;
+    if (directions == Directions::renewed || (directions == Directions::candidate && (!factored || !gained))) {
+      point_along(y);
+      factored = false;
+    }
+    if (!factored || excess > poor_gain * last) {
       if (!factorise(report)) break;
       factored = true;
     }
@@ -271,10 +286,7 @@ ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, bo
     correct(x);
     ++report.iterations;
   }
-  for (int r = 0; r < strains(); ++r)
-    if (takes_part(r) && soft(r))
-      report.tension = std::max(report.tension, force_law(r).multiplier(strain(y, r)) * gram_diagonal[r]);
-  if (fixed_directions) report.energy = limit_energy();
+  report.energy = limit_energy();
   return report;
 }
 
@@ -289,7 +301,7 @@ FastProjection& FastProjection::operator=(FastProjection&&) noexcept = default;
 
 ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t) {
   impl_->begin(t);
-  return impl_->iterate(x, false);
+  return impl_->iterate(x, Impl::Directions::renewed);
 }
 
 ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
@@ -300,15 +312,27 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   evaluate(s.composed, start, s.fixed_places, s.tangents);
   s.begin(t);
   s.point_along(s.tangents);
+  for (int r = 0; r < s.strains(); ++r)
+    if (s.takes_part(r) && s.rows.strain[r].stiffness > 0) s.compliance[r] = 1 / (s.rows.strain[r].stiffness * dt * dt);
   // What held the state at the start is the first guess: the multipliers that its strains stand for.
   s.rhs.setZero();
-  for (int r = 0; r < s.strains(); ++r) {
-    if (!s.takes_part(r) || !(s.rows.strain[r].stiffness > 0)) continue;
-    s.compliance[r] = 1 / (s.rows.strain[r].stiffness * dt * dt);
-    s.rhs[r] = s.law(r).multiplier(s.strain(s.tangents, r)) / s.scale[r];
-  }
+  for (int r = 0; r < s.strains(); ++r)
+    if (s.soft(r)) s.rhs[r] = s.law(r).multiplier(s.strain(s.tangents, r)) / s.scale[r];
+  s.candidate = x;
   s.push(s.rhs, x);
-  return s.iterate(x, true);
+  ProjectionReport report = s.iterate(x, Impl::Directions::start);
+  if (report.converged && report.residual <= s.options.residual) return report;
+  // Light nodes at a trim may turn too far in a step: then along the candidate's gradients, from no force on.
+  x = s.candidate;
+  s.clear();
+  const ProjectionReport again = s.iterate(x, Impl::Directions::candidate);
+  const int iterations = report.iterations + again.iterations;
+  const double seconds = report.factor_seconds + again.factor_seconds;
+  report = again;
+  report.damped = true;
+  report.iterations = iterations;
+  report.factor_seconds = seconds;
+  return report;
 }
 
 ProjectionReport FastProjection::measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
@@ -323,29 +347,6 @@ double FastProjection::energy(const Eigen::Ref<const Eigen::VectorXd>& x, double
   if (s.options.variant == ProjectionVariant::paper) return 0;
   evaluate(s.composed, x, s.map.fixed_places(t), s.y);
   return s.limit_energy();
-}
-
-Eigen::VectorXd FastProjection::tensions(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
-  Impl& s = *impl_;
-  Eigen::VectorXd tension = Eigen::VectorXd::Zero(s.strains());
-  if (s.options.variant == ProjectionVariant::paper) return tension;
-  evaluate(s.composed, x, s.map.fixed_places(t), s.y);
-  for (int r = 0; r < s.strains(); ++r)
-    if (s.takes_part(r) && s.rows.strain[r].stiffness > 0)
-      tension[r] = std::max(0.0, s.force_law(r).multiplier(s.strain(s.y, r)));
-  return tension;
-}
-
-void FastProjection::add_tension_stiffness(const Eigen::VectorXd& tensions, const Eigen::Ref<const Eigen::VectorXd>& dx,
-                                           Eigen::Ref<Eigen::VectorXd> df) const {
-  const CompressedRows& free = impl_->composed.free;
-  for (int r = 0; r < impl_->strains(); ++r) {
-    if (tensions[r] == 0) continue;
-    Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-    for (int e = free.start[r]; e < free.start[r + 1]; ++e) turn += free.value[e] * dx.segment<3>(3 * free.column[e]);
-    turn *= tensions[r];
-    for (int e = free.start[r]; e < free.start[r + 1]; ++e) df.segment<3>(3 * free.column[e]) += free.value[e] * turn;
-  }
 }
 
 const Eigen::VectorXd& FastProjection::strain_multipliers() const { return impl_->strain_lambda; }

@@ -198,7 +198,7 @@ double apart(const Build& a, const Drape& da, const Build& b, const Drape& db) {
 
 // The seam is nowhere in particular, while the cloth moves by centimetres: at p = 2 a tube turned by whole spans has
 // the same splines and drapes alike to rounding; half a span turns the whole mesh, and at p = 3 the seam has a freedom
-// more than other knot lines: 0.2 and 0.1 mm.
+// more than other knot lines: 0.2 and 0.1 mm, as much as the rational circle's uneven parameter gives.
 TEST(Closed, WhereTheSeamLiesDoesNotMatter) {
   const std::string scene = test::scene_text(rim, sideways);
   const Build plain = built(tube(2), scene);
@@ -215,7 +215,7 @@ TEST(Closed, WhereTheSeamLiesDoesNotMatter) {
 
   const std::string fine = test::scene_text("refine = { spans = [12, 6] }\n" + rim, sideways);
   const Build exact = built(rational_tube(), fine), turned_exact = built(rational_tube(pi / 2), fine);
-  EXPECT_LT(apart(exact, draped(exact), turned_exact, draped(turned_exact)), 1e-4);
+  EXPECT_LT(apart(exact, draped(exact), turned_exact, draped(turned_exact)), 2e-4);
 }
 
 // The coefficients of a closed spline that passes through `through(fraction of the round)` at m even places.
