@@ -82,9 +82,31 @@ std::map<std::string, int> unused(const System& system) {
   return reasons;
 }
 
+// What the scene names and no part of this version simulates: a drape without it would be another one, so it is
+// refused.
+std::vector<std::string> not_simulated(const Scene& scene) {
+  std::vector<std::string> out;
+  const auto add = [&](const auto& tables, const char* key, const char* words) {
+    if (tables.empty()) return;
+    out.push_back(
+        fmt::format("{}: {} are not simulated by this version; drape without the {} [[{}]] table{} with "
+                    "--set '{}=[]'",
+                    tables.front().where, words, tables.size(), key, tables.size() == 1 ? "" : "s", key));
+  };
+  add(scene.seams, "seam", "seams");
+  add(scene.obstacles, "obstacle", "obstacles");
+  return out;
+}
+
+void refuse_not_simulated(const Scene& scene) {
+  const std::vector<std::string> reasons = not_simulated(scene);
+  if (!reasons.empty()) throw InputError(fmt::format("{}", fmt::join(reasons, "\n")));
+}
+
 }  // namespace
 
 int drape(Scene scene, const DrapeOptions& options, Console& console) {
+  refuse_not_simulated(scene);
   const std::filesystem::path directory = options.directory.value_or(std::filesystem::path("out") / scene.name);
   const Build built = build(std::move(scene));
   for (const std::string& warning : built.warnings) console.warning(warning);
@@ -161,6 +183,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
 }
 
 int dry_run(Scene scene, bool json, Console& console) {
+  refuse_not_simulated(scene);
   const Build built = build(std::move(scene));
   for (const std::string& warning : built.warnings) console.warning(warning);
   std::unique_ptr<System> system = assemble(built, 0);
@@ -217,6 +240,7 @@ int dry_run(Scene scene, bool json, Console& console) {
 int check_scene(Scene scene, bool json, Console& console) {
   const Build built = build(std::move(scene));
   const std::unique_ptr<System> system = assemble(built, 0);
+  const std::vector<std::string> idle = not_simulated(built.scene);
   if (json) {
     nlohmann::ordered_json out;
     out["scene"] = built.scene.name;
@@ -228,10 +252,12 @@ int check_scene(Scene scene, bool json, Console& console) {
                                {"constraint_points", panel.points.size()}});
     }
     out["warnings"] = built.warnings;
+    out["not_simulated"] = idle;
     fmt::print("{}\n", json_text(out));
     return exit_ok;
   }
   for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& reason : idle) console.warning(reason);
   for (std::size_t k = 0; k < built.panels.size(); ++k) fmt::print("{}\n", describe(built, k));
   fmt::print("{}: valid\n", built.scene.path.string());
   return exit_ok;

@@ -19,22 +19,6 @@
 namespace toile {
 namespace {
 
-NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) {
-  NurbsSurface surface = face.surface;
-  if (!surface.u().clamped() || !surface.v().clamped()) surface = clamp(surface);
-  if (!options.degree && !options.span && !options.spans) return surface;
-  RefineOptions refinement;
-  refinement.degree = options.degree;
-  if (options.span) refinement.span = *options.span / face.metres_per_unit;
-  if (options.spans) refinement.spans = {*options.spans, *options.spans};
-  refinement.tolerance = std::max(face.resolution, 1e-9 * bounding_box(surface).diagonal().norm());
-  try {
-    return refine(surface, refinement).surface;
-  } catch (const GeometryError& error) {
-    throw GeometryError(fmt::format("{}: panel '{}': {}", face.source, face.name, error.what()));
-  }
-}
-
 // Largest distance in the parameter plane between the end of one curve and the start of the next.
 double gap(const TrimLoop& loop) {
   double largest = 0;
@@ -212,37 +196,64 @@ nlohmann::ordered_json panel_json(const InspectedPanel& panel) {
 
 // ---- text ----
 
-std::string panel_text(const InspectedPanel& panel) {
+std::ptrdiff_t used_points(const InspectedPanel& panel) {
+  return std::ranges::count(panel.points, true, &ConstraintPoint::used);
+}
+
+// One line a panel.
+std::string overview(const Inspection& inspection) {
+  std::size_t width = 8;
+  for (const InspectedPanel& panel : inspection.panels)
+    width = std::max(width, std::min<std::size_t>(24, panel.face.name.size()));
+  std::string out = fmt::format("\n  {:<{}}  {:>10}  {:>11}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", "panel", width,
+                                "area m2", "perimeter m", "degree", "net", "cells in/cut/out", "loops", "points used");
+  for (const InspectedPanel& panel : inspection.panels) {
+    const NurbsSurface& surface = panel.face.surface;
+    std::size_t curves = 0;
+    for (const TrimLoop& loop : panel.face.loops) curves += static_cast<std::size_t>(curves_in_file(loop));
+    out +=
+        fmt::format("  {:<{}.{}}  {:>10.6g}  {:>11.6g}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", panel.face.name, width,
+                    width, area(panel), perimeter(panel),
+                    fmt::format("{}x{}{}", surface.u().degree(), surface.v().degree(), surface.rational() ? "r" : ""),
+                    fmt::format("{}x{}", surface.count_u(), surface.count_v()),
+                    fmt::format("{}/{}/{}", count_cells(panel, CellKind::inside), count_cells(panel, CellKind::cut),
+                                count_cells(panel, CellKind::outside)),
+                    fmt::format("{} ({})", panel.face.loops.size(), curves),
+                    fmt::format("{}/{}", used_points(panel), panel.points.size()));
+  }
+  return out;
+}
+
+// Loops and curves as a scene addresses them.
+std::string curves_text(const InspectedPanel& panel) {
   const NurbsSurface& surface = panel.face.surface;
   const double metre = panel.face.metres_per_unit;
   const Interval du = surface.u().domain(), dv = surface.v().domain();
-  std::string out = fmt::format("\npanel '{}'\n", panel.face.name);
-  out += fmt::format("  surface     degree {} x {}, {} x {} control points ({} carry cloth), {}\n",
-                     surface.u().degree(), surface.v().degree(), surface.count_u(), surface.count_v(),
-                     panel.active_control_points, surface.rational() ? "rational" : "polynomial");
-  out += fmt::format("  domain      u [{}, {}], v [{}, {}]\n", du.min, du.max, dv.min, dv.max);
-  out += fmt::format("  area        {:.6g} m2, perimeter {:.6g} m\n", area(panel), perimeter(panel));
-  out += fmt::format("  cells       {} inside, {} cut, {} outside\n", count_cells(panel, CellKind::inside),
-                     count_cells(panel, CellKind::cut), count_cells(panel, CellKind::outside));
-
-  out += panel.face.natural_bounds ? "\n  The face has no trim; its border counts as loop 0.\n" : "\n";
-  out += "  curve        length m   from (u, v)                 to (u, v)\n";
+  std::string out =
+      fmt::format("\npanel '{}'  u [{:.6g}, {:.6g}]  v [{:.6g}, {:.6g}]{}{}\n", panel.face.name, du.min, du.max, dv.min,
+                  dv.max, panel.face.natural_bounds ? "  no trim: its border is loop 0" : "",
+                  panel.face.marks.empty() ? "" : fmt::format("  {} marks", panel.face.marks.size()));
   for (const auto& [loop, length] : loops_in_file_order(panel)) {
-    out += fmt::format("  {:<12} {:<10.6g} loop {}, gap {:.2g}\n", fmt::format("{}", name(loop->kind)), length * metre,
-                       loop->index, gap_as_read(panel, loop->index));
+    out +=
+        fmt::format("  {:<10} {:>10.6g} m{}\n", name(loop->kind), length * metre,
+                    gap_as_read(panel, loop->index) > 0 ? fmt::format("  gap {:.2g}", gap_as_read(panel, loop->index))
+                                                        : std::string());
     const auto at = static_cast<int>(loop - panel.face.loops.data());
     for (std::size_t c = 0; c < loop->curves.size(); ++c) {
       const TrimCurve& curve = loop->curves[c];
       const double curve_length =
           CurveOnSurface(panel.face, panel.topology, at, static_cast<int>(c), surface).length() * metre;
       const auto place = [](const Eigen::Vector2d& p) { return fmt::format("({:.6g}, {:.6g})", p.x(), p.y()); };
-      out += fmt::format("  {:<12} {:<10.6g} {:<27} {}{}\n", fmt::format("curve:{},{}", loop->index, curve.index),
+      out += fmt::format("  {:<10} {:>10.6g} m  {:<24} {}{}\n", fmt::format("curve:{},{}", loop->index, curve.index),
                          curve_length, place(curve.curve.start()), place(curve.curve.end()),
                          curve.reversed ? "  (run backwards)" : "");
     }
   }
+  return out;
+}
 
-  out += "\n  points         all   used\n";
+std::string points_text(const InspectedPanel& panel) {
+  std::string out = fmt::format("\npoints of '{}'\n  {:<12} {:>5}  {:>5}\n", panel.face.name, "kind", "all", "used");
   for (const PointKind kind : {PointKind::vertex, PointKind::crossing_u, PointKind::crossing_v, PointKind::tangent_u,
                                PointKind::tangent_v, PointKind::crossing_uv}) {
     const auto all = std::ranges::count(panel.points, kind, &ConstraintPoint::kind);
@@ -266,6 +277,22 @@ std::string panel_text(const InspectedPanel& panel) {
 }
 
 }  // namespace
+
+NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) {
+  NurbsSurface surface = face.surface;
+  if (!surface.u().clamped() || !surface.v().clamped()) surface = clamp(surface);
+  if (!options.degree && !options.span && !options.spans) return surface;
+  RefineOptions refinement;
+  refinement.degree = options.degree;
+  if (options.span) refinement.span = *options.span / face.metres_per_unit;
+  if (options.spans) refinement.spans = {*options.spans, *options.spans};
+  refinement.tolerance = std::max(face.resolution, 1e-9 * bounding_box(surface).diagonal().norm());
+  try {
+    return refine(surface, refinement).surface;
+  } catch (const GeometryError& error) {
+    throw GeometryError(fmt::format("{}: panel '{}': {}", face.source, face.name, error.what()));
+  }
+}
 
 Inspection inspect(const PanelFile& file, const InspectOptions& options) {
   Inspection out;
@@ -298,19 +325,39 @@ nlohmann::ordered_json inspect_json(const Inspection& inspection) {
           {"warnings", std::move(warnings)}, {"entities", std::move(entities)}, {"panels", std::move(panels)}};
 }
 
-std::string inspect_text(const Inspection& inspection) {
+std::string inspect_text(const Inspection& inspection, bool points) {
   std::string out = fmt::format("{}  {}{}\n", inspection.file, inspection.unit,
                                 inspection.exporter.empty() ? "" : ", written by " + inspection.exporter);
-  out += "  entities   ";
+  if (!inspection.entities.empty()) out += "  entities   ";
   for (const auto& [type, count] : inspection.entities) out += fmt::format(" {} x {}", count, type);
-  out += '\n';
+  if (!inspection.entities.empty()) out += '\n';
+  // Converted entities by type; what is left out one by one.
+  std::map<std::pair<int, std::string>, int> converted;
   for (const LedgerEntry& entry : inspection.ledger) {
-    out += fmt::format("  {}    line {}: entity {}: {}\n",
-                       entry.disposition == Disposition::converted ? "converted" : "left out ", entry.line, entry.type,
-                       entry.why);
+    if (entry.disposition == Disposition::converted) {
+      ++converted[{entry.type, entry.why}];
+    } else {
+      out += fmt::format("  left out     line {}: entity {}: {}\n", entry.line, entry.type, entry.why);
+    }
   }
-  for (const std::string& warning : inspection.warnings) out += "  warning     " + warning + '\n';
-  for (const InspectedPanel& panel : inspection.panels) out += panel_text(panel);
+  for (const auto& [what, count] : converted) {
+    out += fmt::format("  converted    {} x {}: {}\n", count, what.first, what.second);
+  }
+  constexpr std::size_t shown = 12;
+  for (std::size_t k = 0; k < inspection.warnings.size() && (points || k < shown); ++k) {
+    out += "  warning      " + inspection.warnings[k] + '\n';
+  }
+  if (!points && inspection.warnings.size() > shown) {
+    out += fmt::format("  and {} warnings more: -v lists all\n", inspection.warnings.size() - shown);
+  }
+  if (inspection.panels.empty()) return out + "  no panel\n";
+  out += overview(inspection);
+  for (const InspectedPanel& panel : inspection.panels) out += curves_text(panel);
+  if (points) {
+    for (const InspectedPanel& panel : inspection.panels) out += points_text(panel);
+  } else {
+    out += "\n-v lists the constraint points, --svg, --png or --html draw them\n";
+  }
   return out;
 }
 

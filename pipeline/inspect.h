@@ -25,6 +25,9 @@ struct InspectOptions {
   bool select_rows = true;     // say which points the projection takes, for the default fabric and no pins
 };
 
+// The face's surface, clamped, with these degrees and knots. Throws GeometryError where they can't be had.
+NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options);
+
 struct InspectedPanel {
   TrimmedSurface face;  // refined as asked, loops valid
   TrimTopology topology;
@@ -47,8 +50,11 @@ struct Inspection {
 // Throws GeometryError where a panel has no valid trim, with panel, loop and place.
 Inspection inspect(const PanelFile& file, const InspectOptions& options = {});
 
-std::string inspect_text(const Inspection& inspection);
+// A table of the panels and their curves; `points`: with the constraint points one by one.
+std::string inspect_text(const Inspection& inspection, bool points = false);
 nlohmann::ordered_json inspect_json(const Inspection& inspection);  // the contract of design.md
 std::string inspect_svg(const Inspection& inspection);
+std::string inspect_png(const Inspection& inspection);   // the same drawing
+std::string inspect_html(const Inspection& inspection);  // a page of its own: the drawing, tables, warnings
 
 }  // namespace toile

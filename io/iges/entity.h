@@ -61,6 +61,13 @@ CopiousData read_copious(Parameters& in);
 void write(const CopiousData& data, Record& out);
 Curve3 to_curve(const CopiousData& data);
 
+// 212: the strings of a general note, each where it begins. [IGES 5.3, 4.60]
+struct NoteString {
+  Eigen::Vector3d at{0, 0, 0};
+  std::string text;
+};
+std::vector<NoteString> read_note(Parameters& in);
+
 // 102: directory numbers of its curves, in order.
 std::vector<int> read_composite(Parameters& in);
 void write_composite(const std::vector<int>& curves, Record& out);

@@ -1,5 +1,6 @@
 // From records to panels: follows the pointers of faces, boundaries and curves, keeps the ledger, quarantines what is bad.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -8,6 +9,7 @@
 #include "io/file.h"
 #include "io/iges.h"
 #include "io/iges/entity.h"
+#include "io/outlines.h"
 
 namespace toile {
 
@@ -40,7 +42,10 @@ class Reader {
   std::string name_property(Parameters& in);
   void mark(const Entry& e, Disposition disposition, std::string why = {});
   void find_used_surfaces(std::set<int>& used);
+  void finish_panel(TrimmedSurface panel, const Entry& e);
   void finish_names();
+  bool holds_faces() const;
+  void read_outlines();
   void note(const Entry& e, const std::string& kind, const std::string& what) { notes_.add(kind, file_.place(e) + what); }
 
   const File& file_;
@@ -380,6 +385,85 @@ void Reader::finish_names() {
   }
 }
 
+void Reader::finish_panel(TrimmedSurface panel, const Entry& e) {
+  panel.metres_per_unit = out_.metres_per_unit;
+  panel.resolution = out_.resolution;
+  panel.source = file_.name + ":" + std::to_string(e.line) + ": entity " + std::to_string(e.type);
+  out_.panels.push_back(std::move(panel));
+}
+
+bool Reader::holds_faces() const {
+  constexpr std::array<int, 19> types{108, 114, 118, 120, 122, 128, 140, 141, 142, 143, 144, 186, 190, 192, 194, 196, 198, 510, 514};
+  return std::ranges::any_of(file_.entries, [&](const Entry& e) { return std::ranges::find(types, e.type) != types.end(); });
+}
+
+// A drawing without any face: closed plane outlines are panels. (iges.md, 12)
+void Reader::read_outlines() {
+  std::set<int> parts;  // of composite curves
+  for (const Entry& e : file_.entries) {
+    if (e.type != 102) continue;
+    try {
+      Parameters in(file_, e);
+      for (const int sequence : read_composite(in)) parts.insert(sequence);
+    } catch (const InputError&) {
+      // Reported below, where the curve is read.
+    }
+  }
+  std::map<std::string, int> labels;
+  std::vector<LooseCurve> curves;
+  std::vector<LoosePoint> points;
+  for (const Entry& e : file_.entries) {
+    const Kind* kind = find_kind(e.type);
+    const bool curve = e.type == 102 || (kind && kind->curve);
+    const bool copious_points = e.type == 106 && e.form >= 1 && e.form <= 3;
+    const bool drawing = e.type == 106 && e.form >= 20 && e.form != 63;  // centre lines, hatching, witness lines
+    if (parts.count(e.sequence) != 0 || drawing || !(curve || e.type == 116 || e.type == 212)) continue;
+    try {
+      Parameters in(file_, e, &notes_);
+      const Eigen::Affine3d t = transform(e);
+      const auto add_point = [&](const Eigen::Vector3d& at, const std::string& words) {
+        points.push_back({e.sequence, e.label, t * at, words});
+        mark(e, Disposition::read);
+      };
+      if (e.type == 116) {
+        Eigen::Vector3d at;
+        for (int axis = 0; axis < 3; ++axis) at[axis] = in.real("coordinate of the point");
+        add_point(at, "");
+      } else if (e.type == 212) {
+        for (const NoteString& line : read_note(in)) add_point(line.at, line.text);
+      } else if (copious_points) {
+        const CopiousData data = read_copious(in);
+        const std::size_t width = data.kind == 1 ? 2 : data.kind == 2 ? 3 : 6;
+        for (std::size_t k = 0; k < data.numbers.size(); k += width)
+          add_point({data.numbers[k], data.numbers[k + 1], data.kind == 1 ? data.height : data.numbers[k + 2]}, "");
+      } else {
+        LooseCurve loose{e.sequence, {}, {}};
+        for (Piece& piece : this->curves(e.sequence, e, "curve")) loose.pieces.push_back(std::move(piece.curve));
+        if (e.type != 102) kind->curve(in);  // moves to the pointers behind the parameters
+        else read_composite(in);
+        loose.name = name_property(in);
+        if (loose.name.empty()) loose.name = e.label;
+        ++labels[loose.name];
+        curves.push_back(std::move(loose));
+      }
+    } catch (const Error& error) {
+      mark(e, Disposition::quarantined, error.what());
+      notes_.add("outline " + std::to_string(e.sequence), std::string(error.what()) + "; it is left out");
+    }
+  }
+  if (curves.empty()) return;
+  Outlines found = find_outlines(std::move(curves), points, out_.resolution);
+  for (const OutlineNote& n : found.notes) note(*file_.find(n.id), n.what.substr(0, n.what.find_first_of("0123456789(")), n.what);
+  for (std::size_t k = 0; k < found.panels.size(); ++k) {
+    TrimmedSurface& panel = found.panels[k];
+    const Entry& e = *file_.find(found.ids[k]);
+    // A label that every entity carries ("LINE", "COMPCURV") is no name.
+    labels_.push_back({});
+    if (labels[panel.name] > 1) panel.name.clear();
+    finish_panel(std::move(panel), e);
+  }
+}
+
 void Reader::read() {
   const Global& g = file_.global;
   out_.path = file_.name;
@@ -403,11 +487,7 @@ void Reader::read() {
     const bool is_face = e.type == 144;
     if (!is_face && !(e.type == 128 && used.count(e.sequence) == 0)) continue;
     try {
-      TrimmedSurface panel = is_face ? face(e) : free_surface(e);
-      panel.metres_per_unit = out_.metres_per_unit;
-      panel.resolution = out_.resolution;
-      panel.source = file_.name + ":" + std::to_string(e.line) + ": entity " + std::to_string(e.type);
-      out_.panels.push_back(std::move(panel));
+      finish_panel(is_face ? face(e) : free_surface(e), e);
       labels_.push_back(e.label);
     } catch (const InputError& error) {
       // Its parts may be read; the face is not there.
@@ -419,6 +499,7 @@ void Reader::read() {
     }
   }
   if (out_.panels.empty() && !first_failure.empty()) throw InputError(first_failure);
+  if (!holds_faces()) read_outlines();
   finish_names();
   out_.warnings = notes_.list();
   for (const auto& [type, count] : unread)
