@@ -289,6 +289,19 @@ NurbsCurve<Dim> reversed(const NurbsCurve<Dim>& curve) {
           std::vector<double>(curve.weights().rbegin(), curve.weights().rend())};
 }
 
+template <int Dim>
+NurbsCurve<Dim> with_domain(const NurbsCurve<Dim>& curve, Interval domain) {
+  const Interval old = curve.domain();
+  const double scale = domain.length() / old.length();
+  std::vector<double> knots(curve.knots().knots().begin(), curve.knots().knots().end());
+  for (double& k : knots) {
+    const bool inside = old.contains(k);
+    k = k == old.min ? domain.min : k == old.max ? domain.max : domain.min + (k - old.min) * scale;
+    if (inside) k = std::clamp(k, domain.min, domain.max);
+  }
+  return {KnotVector(curve.degree(), std::move(knots)), curve.points(), curve.weights()};
+}
+
 #define TOILE_INSTANTIATE(Dim)                                                                 \
   template NurbsCurve<Dim> insert_knots(const NurbsCurve<Dim>&, std::span<const double>);      \
   template NurbsCurve<Dim> clamp(const NurbsCurve<Dim>&);                                      \
@@ -296,7 +309,8 @@ NurbsCurve<Dim> reversed(const NurbsCurve<Dim>& curve) {
   template std::optional<NurbsCurve<Dim>> remove_knot(const NurbsCurve<Dim>&, double, double); \
   template std::vector<BezierCurve<Dim>> bezier_pieces(const NurbsCurve<Dim>&);                \
   template NurbsCurve<Dim> sub_curve(const NurbsCurve<Dim>&, Interval);                        \
-  template NurbsCurve<Dim> reversed(const NurbsCurve<Dim>&);
+  template NurbsCurve<Dim> reversed(const NurbsCurve<Dim>&);                                   \
+  template NurbsCurve<Dim> with_domain(const NurbsCurve<Dim>&, Interval);
 TOILE_INSTANTIATE(2)
 TOILE_INSTANTIATE(3)
 #undef TOILE_INSTANTIATE

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,6 +44,8 @@ struct Arc {
 Arc read_arc(Parameters& in);
 void write(const Arc& arc, Record& out);
 Curve3 to_curve(const Arc& arc);
+// The file's parameter along it: from its start's angle, in [0, 2 pi), to its end's [rad].
+Interval arc_angles(const Arc& arc);
 
 // 110
 struct Segment {
@@ -51,15 +54,48 @@ struct Segment {
 Segment read_segment(Parameters& in);
 void write(const Segment& segment, Record& out);
 
-// 106 as a polyline (forms 11, 12, 13 and 63; vectors of form 13 are kept for writing, not used).
+// 106: points (forms 1 to 3), polylines (11 to 13) and closed ones (63). Vectors are kept for writing, not used.
 struct CopiousData {
-  int kind = 1;        // 1: x, y in the plane z = height; 2: x, y, z; 3: with vectors
+  int kind = 1;  // 1: x, y in the plane z = height; 2: x, y, z; 3: with vectors
   double height = 0;
   std::vector<double> numbers;  // 2, 3 or 6 a point
 };
 CopiousData read_copious(Parameters& in);
 void write(const CopiousData& data, Record& out);
-Curve3 to_curve(const CopiousData& data);
+// The polyline through the points, neighbours that coincide taken once; `closed`: back to the first point.
+Curve3 to_curve(const CopiousData& data, bool closed);
+
+// 104: the points where A x^2 + B x y + C y^2 + D x + E y + F = 0 in the plane z = height, from start to end: an
+// ellipse counter-clockwise (all of it where the ends are equal), a parabola or one branch of a hyperbola.
+struct Conic {
+  std::array<double, 6> coefficients{};  // A to F
+  double height = 0;
+  Eigen::Vector2d start{0, 0}, end{0, 0};
+};
+Conic read_conic(Parameters& in);
+void write(const Conic& conic, Record& out);
+// Rational quadratic. GeometryError where the ends lie on no common piece of the conic.
+Curve3 to_curve(const Conic& conic);
+
+// 112: polynomials in powers of the distance from each breakpoint; 12 coefficients a segment (x: 1, s, s^2, s^3; y; z).
+struct PowerSpline {
+  int kind = 3, continuity = 1, dimension = 3;
+  std::vector<double> breaks, coefficients, terminal;
+};
+PowerSpline read_power_spline(Parameters& in);
+void write(const PowerSpline& spline, Record& out);
+// Over the breakpoints' range, with every breakpoint a knot as often as the degree. GeometryError where it jumps.
+Curve3 to_curve(const PowerSpline& spline);
+
+// 114, alike: 48 coefficients a patch (x, y, z: 16 each, powers of s fastest), patches v fastest with one more row and
+// column than there are spans.
+struct PowerSurface {
+  int kind = 3, patch_kind = 1;
+  std::vector<double> u, v, coefficients;
+};
+PowerSurface read_power_surface(Parameters& in);
+void write(const PowerSurface& surface, Record& out);
+NurbsSurface to_surface(const PowerSurface& surface);
 
 // 212: the strings of a general note, each where it begins. [IGES 5.3, 4.60]
 struct NoteString {

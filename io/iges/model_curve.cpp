@@ -1,16 +1,15 @@
 #include "io/iges/model_curve.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "geometry/cubic_fit.h"
+
 namespace toile::iges {
 
 namespace {
-
-constexpr int max_halvings = 20;
 
 struct Spans {
   int u, v;
@@ -31,20 +30,17 @@ Spans spans_at(const NurbsSurface& s, const Curve2& c, double t) {
   return {s.u().find_span(p.x()), s.v().find_span(p.y())};
 }
 
-struct Jet {
-  Eigen::Vector3d x, d;
-};
-
-Jet evaluate(const SmoothPiece& piece, double t) {
+PathPoint<3> evaluate(const SmoothPiece& piece, double t) {
   const CurveJet<2> c = toile::evaluate(piece.curve, t);
   const NurbsSurface& s = *piece.surface;
-  if ((s.u().degree() + 1) * (s.v().degree() + 1) > SurfaceBasis::capacity || s.u().degree() > 7 || s.v().degree() > 7) {
+  if ((s.u().degree() + 1) * (s.v().degree() + 1) > SurfaceBasis::capacity || s.u().degree() > 7 ||
+      s.v().degree() > 7) {
     const SurfaceJet jet = toile::evaluate(s, c.x.x(), c.x.y());
     return {jet.x, jet.u * c.d1.x() + jet.v * c.d1.y()};
   }
   SurfaceBasis basis;
   evaluate_basis_on_span(s, piece.spans.u, piece.spans.v, c.x.x(), c.x.y(), basis);
-  Jet out{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  PathPoint<3> out{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   for (int b = 0; b < basis.count_v; ++b)
     for (int a = 0; a < basis.count_u; ++a) {
       const auto k = static_cast<std::size_t>(a + basis.count_u * b);
@@ -53,37 +49,6 @@ Jet evaluate(const SmoothPiece& piece, double t) {
       out.d += (basis.value[1][k] * c.d1.x() + basis.value[2][k] * c.d1.y()) * point;
     }
   return out;
-}
-
-struct Span {
-  Interval range;
-  std::array<Eigen::Vector3d, 4> points;  // Bezier
-  Eigen::Vector3d start_derivative, end_derivative;
-};
-
-Eigen::Vector3d value(const Span& span, double t) {
-  const double b = (t - span.range.min) / span.range.length(), a = 1 - b;
-  return a * a * a * span.points[0] + 3 * a * a * b * span.points[1] + 3 * a * b * b * span.points[2] +
-         b * b * b * span.points[3];
-}
-
-void fit(const SmoothPiece& piece, Interval range, const Jet& start, const Jet& end, double tolerance, int halvings,
-         std::vector<Span>& out) {
-  const double h = range.length();
-  const Span span{range, {start.x, start.x + h / 3 * start.d, end.x - h / 3 * end.d, end.x}, start.d, end.d};
-  bool good = true;
-  for (double f : {0.125, 0.3, 0.5, 0.7, 0.875}) {
-    const double t = range.min + f * h;
-    good = good && (value(span, t) - evaluate(piece, t).x).norm() <= tolerance;
-  }
-  const double middle = range.min + 0.5 * h;
-  if (good || halvings == max_halvings || !(range.min < middle && middle < range.max)) {
-    out.push_back(span);
-    return;
-  }
-  const Jet jet = evaluate(piece, middle);
-  fit(piece, {range.min, middle}, start, jet, tolerance, halvings + 1, out);
-  fit(piece, {middle, range.max}, jet, end, tolerance, halvings + 1, out);
 }
 
 // Where the spans under c change between samples, found by halving. These places only make the fit cheap: one that is
@@ -109,31 +74,6 @@ void add_crossings(const NurbsSurface& s, const Curve2& c, Interval range, std::
     }
     a = probe;
   }
-}
-
-Curve3 joined(const std::vector<Span>& spans) {
-  std::vector<double> knots(4, spans.front().range.min);
-  std::vector<Eigen::Vector3d> points{spans.front().points[0]};
-  for (std::size_t i = 0; i < spans.size(); ++i) {
-    const Span& span = spans[i];
-    points.push_back(span.points[1]);
-    points.push_back(span.points[2]);
-    const bool last = i + 1 == spans.size();
-    const double end = span.range.max;
-    if (last) {
-      knots.insert(knots.end(), 4, end);
-      points.push_back(span.points[3]);
-      break;
-    }
-    // One derivative on both sides: the joint is no control point of its own.
-    const Eigen::Vector3d jump = spans[i + 1].start_derivative - span.end_derivative;
-    const bool smooth = jump.norm() <= 1e-9 * span.end_derivative.norm();
-    knots.insert(knots.end(), smooth ? 2 : 3, end);
-    if (!smooth) points.push_back(span.points[3]);
-  }
-  Eigen::Matrix3Xd net(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i) net.col(static_cast<Eigen::Index>(i)) = points[i];
-  return Curve3(KnotVector(3, std::move(knots)), std::move(net));
 }
 
 double distance(const Curve3& curve, const NurbsSurface& s, const Curve2& c) {
@@ -163,7 +103,7 @@ ModelCurve fit_model_curve(const NurbsSurface& surface, const Curve2& c, double 
     // Far from the origin the places themselves are no finer.
     const double rounding = 64 * std::numeric_limits<double>::epsilon() * surface.points().cwiseAbs().maxCoeff();
     tolerance = std::max(tolerance, rounding);
-    std::vector<Span> spans;
+    std::vector<SmoothPath<3>> path;
     for (const BezierCurve<2>& bezier : bezier_pieces(c)) {
       const auto degree = static_cast<int>(bezier.points.cols()) - 1;
       std::vector<double> knots(static_cast<std::size_t>(degree) + 1, bezier.range.min);
@@ -179,10 +119,10 @@ ModelCurve fit_model_curve(const NurbsSurface& surface, const Curve2& c, double 
       for (std::size_t i = 0; i + 1 < breaks.size(); ++i) {
         const Interval range{breaks[i], breaks[i + 1]};
         piece.spans = spans_at(surface, piece.curve, 0.5 * (range.min + range.max));
-        fit(piece, range, evaluate(piece, range.min), evaluate(piece, range.max), tolerance, 0, spans);
+        path.push_back({range, [piece](double t) { return evaluate(piece, t); }});
       }
     }
-    out.curve = joined(spans);
+    out.curve = fit_cubic<3>(path, {.tolerance = tolerance}).curve;
   }
   out.error = distance(out.curve, surface, c);
   return out;

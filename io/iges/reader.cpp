@@ -1,7 +1,10 @@
-// From records to panels: follows the pointers of faces, boundaries and curves, keeps the ledger, quarantines what is bad.
+// From records to panels: follows the pointers of faces, boundaries and curves, keeps the ledger, quarantines what is
+// bad.
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <numbers>
 #include <set>
 
 #include "geometry/error.h"
@@ -9,6 +12,9 @@
 #include "io/file.h"
 #include "io/iges.h"
 #include "io/iges/entity.h"
+#include "io/iges/face.h"
+#include "io/iges/surfaces.h"
+#include "io/iges/topology.h"
 #include "io/outlines.h"
 
 namespace toile {
@@ -19,9 +25,10 @@ namespace {
 // Composite curves within composite curves, transformations of transformations: deeper means a cycle.
 constexpr int max_depth = 16;
 
-struct Piece {
-  Curve3 curve;
-  int sequence = 0;
+// A face-bearing entity and where an instance or a solid puts it.
+struct Job {
+  const Entry* entry;
+  Eigen::Affine3d placement;
 };
 
 class Reader {
@@ -31,26 +38,45 @@ class Reader {
 
  private:
   const Entry& entry(int sequence, const Entry& from, const char* role) const;
+  const Entry& entry(int sequence, const Entry& from, const char* role, int type) const;
   void spend(const Entry& e);
   Eigen::Affine3d transform(const Entry& e);
-  void append_curves(const Entry& e, std::vector<Piece>& out, int depth);
-  std::vector<Piece> curves(int sequence, const Entry& from, const char* role);
-  TrimLoop loop(const Entry& boundary, int surface, const NurbsSurface& s, const Eigen::Affine3d& face_transform);
-  NurbsSurface surface(const Entry& e, bool trimmed, std::string& name);
-  TrimmedSurface face(const Entry& e);
-  TrimmedSurface free_surface(const Entry& e);
+  void append_curves(const Entry& e, std::vector<Curve3>& out, int depth);
+  std::vector<Curve3> curves(int sequence, const Entry& from, const char* role);
+  NaturalCurve natural_curve(const Entry& e, int depth = 0);
+  Curve3 offset_curve(const Entry& e, int depth);
+  double fit_tolerance(double size) const;
+
+  Frame analytic_frame(const Entry& e, const Analytic& s);
+  FileSurface surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name, int depth = 0);
+  FileSurface own_surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name, int depth);
+
+  BoundaryCurves curve_on_surface(const Entry& e, int surface);
+  BoundaryCurves boundary_list(const Entry& e, int surface);
+  BoundaryCurves edge_loop(const Entry& e);
+  const EdgeList& edges_of(const Entry& e);
+
+  std::vector<TrimmedSurface> face(const Entry& e);
   std::string name_property(Parameters& in);
+  void find_faces(std::vector<Job>& jobs);
+  void expand(const Entry& e, const Eigen::Affine3d& placement, int depth, std::vector<Job>& jobs);
+  void add_panels(const Job& job);
   void mark(const Entry& e, Disposition disposition, std::string why = {});
+  void quarantine(const Entry& e, const std::string& why);
   void find_used_surfaces(std::set<int>& used);
-  void finish_panel(TrimmedSurface panel, const Entry& e);
   void finish_names();
   bool holds_faces() const;
   void read_outlines();
-  void note(const Entry& e, const std::string& kind, const std::string& what) { notes_.add(kind, file_.place(e) + what); }
+  void note(const Entry& e, const std::string& kind, const std::string& what) {
+    notes_.add(kind, file_.place(e) + what);
+  }
 
   const File& file_;
   PanelFile& out_;
   Notes notes_;
+  std::map<int, EdgeList> edge_lists_;
+  std::set<int> used_surfaces_;
+  std::string first_failure_;
   std::vector<std::string> labels_;  // of the panels, for those without a name
   std::size_t spent_ = 0;            // characters of records that were read, again and again where they are shared
 };
@@ -61,6 +87,14 @@ const Entry& Reader::entry(int sequence, const Entry& from, const char* role) co
     throw InputError(file_.place(from) + "pointer " + std::to_string(sequence) + " to its " + role +
                      " leads nowhere, must be an odd number up to " + std::to_string(2 * file_.entries.size() - 1));
   return *found;
+}
+
+const Entry& Reader::entry(int sequence, const Entry& from, const char* role, int type) const {
+  const Entry& found = entry(sequence, from, role);
+  if (found.type != type)
+    throw InputError(file_.place(from) + "its " + role + " is an entity " + std::to_string(found.type) + ", must be " +
+                     std::to_string(type));
+  return found;
 }
 
 // Surfaces and curves may be shared; a small file that shares a large record ten thousand times is an attack.
@@ -86,7 +120,8 @@ Eigen::Affine3d Reader::transform(const Entry& e) {
     if (depth == max_depth) throw InputError(file_.place(e) + "its transformations form a cycle");
     const Entry& matrix = entry(at->transform, *at, "transformation");
     if (matrix.type != 124)
-      throw InputError(file_.place(*at) + "its transformation is an entity " + std::to_string(matrix.type) + ", must be 124");
+      throw InputError(file_.place(*at) + "its transformation is an entity " + std::to_string(matrix.type) +
+                       ", must be 124");
     Parameters in(file_, matrix, &notes_);
     result = read_transform(in) * result;
     mark(matrix, Disposition::read);
@@ -104,8 +139,39 @@ Curve3 transformed(const Eigen::Affine3d& t, const Curve3& curve) {
   return Curve3(curve.knots(), t * curve.points(), curve.weights());
 }
 
-void Reader::append_curves(const Entry& e, std::vector<Piece>& out, int depth) {
-  if (depth > max_depth) throw InputError(file_.place(e) + "its composite curves form a cycle");
+bool is_group(const Entry& e) {
+  return e.type == 402 && (e.form == 1 || e.form == 7 || e.form == 9 || e.form == 14 || e.form == 15);
+}
+
+// A parameter of a record, the entity type being number 0; nullopt where it is no integer.
+std::optional<int> nth_integer(const File& file, const Entry& e, int n) {
+  try {
+    Parameters in(file, e);
+    if (n < in.size()) return parse_integer(in.token(n).text);
+  } catch (const InputError&) {
+    // The entity itself is quarantined for this, with the message.
+  }
+  return std::nullopt;
+}
+
+// How far a fitted curve or surface may lie from what the file means.
+double Reader::fit_tolerance(double size) const {
+  const double resolution = file_.global.resolution > 0 ? file_.global.resolution : 1e-7 * size;
+  return std::clamp(resolution, 1e-9 * size, 1e-5 * size);
+}
+
+Curve3 Reader::offset_curve(const Entry& e, int depth) {
+  Parameters in(file_, e, &notes_);
+  const OffsetCurve record = read_offset_curve(in);
+  const Curve3 base = natural_curve(entry(record.curve, e, "curve to offset"), depth + 1).curve;
+  const double size = (base.points().rowwise().maxCoeff() - base.points().rowwise().minCoeff()).norm();
+  FittedCurve fitted = to_curve(record, base, fit_tolerance(size));
+  mark(e, Disposition::converted, "offset curve as cubic B-spline, off by " + format_real(fitted.error));
+  return std::move(fitted.curve);
+}
+
+void Reader::append_curves(const Entry& e, std::vector<Curve3>& out, int depth) {
+  if (depth > max_depth) throw InputError(file_.place(e) + "its curves form a cycle");
   const Kind* kind = find_kind(e.type);
   const std::size_t first = out.size();
   spend(e);
@@ -113,168 +179,335 @@ void Reader::append_curves(const Entry& e, std::vector<Piece>& out, int depth) {
     Parameters in(file_, e, &notes_);
     for (int sequence : read_composite(in)) append_curves(entry(sequence, e, "curve"), out, depth + 1);
     // Shared curves inside shared composites could multiply without end.
-    if (out.size() > 4 * file_.entries.size() + 16) throw InputError(file_.place(e) + "it repeats its curves too often");
+    if (out.size() > 4 * file_.entries.size() + 16)
+      throw InputError(file_.place(e) + "it repeats its curves too often");
     mark(e, Disposition::read);
+  } else if (e.type == 130) {
+    try {
+      out.push_back(offset_curve(e, depth));
+    } catch (const GeometryError& error) {
+      throw InputError(file_.place(e) + error.what());
+    }
   } else if (kind && kind->curve) {
     Parameters in(file_, e, &notes_);
     try {
-      out.push_back({kind->curve(in), e.sequence});
+      out.push_back(kind->curve(in));
     } catch (const GeometryError& error) {
       in.fail(error.what());
     }
     mark(e, kind->converted ? Disposition::converted : Disposition::read,
          kind->converted ? std::string(kind->name) + " as B-spline curve" : std::string());
   } else {
-    throw InputError(file_.place(e) + "as a boundary curve it is not read, must be 100, 102, 106, 110 or 126");
+    throw InputError(file_.place(e) +
+                     "as a boundary curve it is not read, must be 100, 102, 104, 106, 110, 112, 126 or 130");
   }
   const Eigen::Affine3d t = transform(e);
-  for (std::size_t i = first; i < out.size(); ++i) out[i].curve = transformed(t, out[i].curve);
+  for (std::size_t i = first; i < out.size(); ++i) out[i] = transformed(t, out[i]);
 }
 
-std::vector<Piece> Reader::curves(int sequence, const Entry& from, const char* role) {
-  std::vector<Piece> out;
+std::vector<Curve3> Reader::curves(int sequence, const Entry& from, const char* role) {
+  std::vector<Curve3> out;
   append_curves(entry(sequence, from, role), out, 0);
   return out;
 }
 
-Curve2 flattened(const Curve3& curve) { return Curve2(curve.knots(), curve.points().topRows<2>(), curve.weights()); }
-
-// Largest distance between neighbours' ends, relative to the domain, and how far the curves leave the domain, alike.
-struct Fit {
-  double gap = 0, excursion = 0;
-};
-Fit fit_of(const std::vector<Curve2>& curves, const NurbsSurface& s) {
-  const Interval u = s.u().domain(), v = s.v().domain();
-  const Eigen::Vector2d size(u.length(), v.length());
-  Fit fit;
-  for (std::size_t i = 0; i < curves.size(); ++i) {
-    const Eigen::Vector2d jump = curves[(i + 1) % curves.size()].start() - curves[i].end();
-    fit.gap = std::max(fit.gap, jump.cwiseQuotient(size).norm());
-    for (const Eigen::Vector2d& p : {curves[i].start(), curves[i].end()}) {
-      fit.excursion = std::max({fit.excursion, (u.min - p.x()) / size.x(), (p.x() - u.max) / size.x(),
-                                (v.min - p.y()) / size.y(), (p.y() - v.max) / size.y()});
+// With the file's own parameter along it, which a surface's parameters are made of.
+NaturalCurve Reader::natural_curve(const Entry& e, int depth) {
+  if (depth > max_depth) throw InputError(file_.place(e) + "its curves form a cycle");
+  const Eigen::Affine3d t = transform(e);
+  NaturalCurve out;
+  if (e.type == 102) {
+    spend(e);
+    Parameters in(file_, e, &notes_);
+    std::vector<NaturalCurve> pieces;
+    for (int sequence : read_composite(in)) {
+      pieces.push_back(natural_curve(entry(sequence, e, "curve"), depth + 1));
+      if (pieces.size() > 4 * file_.entries.size() + 16)
+        throw InputError(file_.place(e) + "it repeats its curves too often");
     }
+    double size = 0;
+    for (const NaturalCurve& piece : pieces) size = std::max(size, piece.curve.points().cwiseAbs().maxCoeff());
+    try {
+      out = joined(pieces, std::max(file_.global.resolution, 1e-6 * size));
+    } catch (const GeometryError& error) {
+      in.fail(error.what());
+    }
+    mark(e, Disposition::read);
+  } else {
+    std::vector<Curve3> one;
+    append_curves(e, one, depth);
+    out.curve = one.at(0);
+    if (e.type == 100) {
+      Parameters in(file_, e);
+      const Interval angles = arc_angles(read_arc(in));
+      out.curve = with_domain(out.curve, angles);
+      out.turns = {{angles, (out.curve.knots().control_point_count() - 1) / 2}};
+    }
+    return out;  // the transformation is in it
   }
-  return fit;
-}
-
-// Parameter curves of model curves on an affine patch: the inverse map on their control points, exact.
-std::vector<Curve2> pulled_back(const std::vector<Piece>& model, const AffinePatch& patch) {
-  Eigen::Matrix<double, 3, 2> map;
-  map << patch.du, patch.dv;
-  const Eigen::Matrix<double, 2, 3> inverse = (map.transpose() * map).inverse() * map.transpose();
-  std::vector<Curve2> out;
-  for (const Piece& piece : model)
-    out.emplace_back(piece.curve.knots(), Curve2::Points(inverse * (piece.curve.points().colwise() - patch.origin)),
-                     piece.curve.weights());
+  out.curve = transformed(t, out.curve);
   return out;
 }
 
-TrimLoop Reader::loop(const Entry& e, int surface, const NurbsSurface& s, const Eigen::Affine3d& face_transform) {
-  if (e.type != 142)
-    throw InputError(file_.place(e) + "as a boundary of a trimmed surface it must be entity 142");
+Frame Reader::analytic_frame(const Entry& e, const Analytic& s) {
+  const auto direction = [&](int sequence, const char* role) {
+    const Entry& d = entry(sequence, e, role, 123);
+    Parameters in(file_, d, &notes_);
+    const Eigen::Vector3d x = read_direction(in);
+    mark(d, Disposition::read);
+    return Eigen::Vector3d(transform(d).linear() * x);
+  };
+  const Entry& location = entry(s.location, e, "location", 116);
+  Parameters in(file_, location, &notes_);
+  const Eigen::Vector3d origin = transform(location) * read_point(in).x;
+  mark(location, Disposition::read);
+  const Eigen::Vector3d axis = s.axis != 0 ? direction(s.axis, "axis") : Eigen::Vector3d::UnitZ();
+  std::optional<Eigen::Vector3d> reference;
+  if (s.reference != 0) reference = direction(s.reference, "reference direction");
+  return frame(origin, axis, reference);
+}
+
+// Boundary curves seen from the surface's own definition space.
+std::vector<BoundaryCurves> seen_from(const Eigen::Affine3d& t, const std::vector<BoundaryCurves>& boundaries) {
+  if (is_identity(t)) return boundaries;
+  const Eigen::Affine3d back = t.inverse();
+  std::vector<BoundaryCurves> out = boundaries;
+  for (BoundaryCurves& b : out)
+    for (Curve3& c : b.model) c = transformed(back, c);
+  return out;
+}
+
+FileSurface Reader::own_surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name,
+                                int depth) {
+  if (depth > max_depth) throw InputError(file_.place(e) + "its surfaces form a cycle");
+  const bool trimmed = !boundaries.empty();
+  spend(e);
+  Parameters in(file_, e, &notes_);
+  // Tolerance of what has to be fitted: the size is that of the net which the fit starts from.
+  const auto tolerance = [&](const Eigen::Matrix3Xd& points) {
+    return fit_tolerance((points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm());
+  };
+  // What bounds a surface without ends: model curves, else parameter curves, in its frame.
+  const auto extent = [&](const Frame& f) {
+    Eigen::AlignedBox3d box = reach(f, boundaries);
+    if (!box.isEmpty()) return box;
+    for (const BoundaryCurves& b : boundaries)
+      for (const Curve3& c : b.parameter)
+        for (const auto& p : c.points().colwise())
+          box.extend(e.type == 108 || e.type == 190 ? Eigen::Vector3d(p.x(), p.y(), 0) : Eigen::Vector3d(0, 0, p.y()));
+    return box;
+  };
+  switch (e.type) {
+    case 108: {
+      const Frame f = frame(read_plane(in));
+      name = name_property(in);
+      const Eigen::AlignedBox3d box = extent(f);
+      if (box.isEmpty()) in.fail("a plane without a boundary has no end");
+      return plane_patch(f, {box.min().head<2>(), box.max().head<2>()});
+    }
+    case 190:
+    case 192:
+    case 194:
+    case 196:
+    case 198: {
+      const Analytic s = read_analytic(in);
+      name = name_property(in);
+      const Frame f = analytic_frame(e, s);
+      const Eigen::AlignedBox3d box = extent(f);
+      if (e.type < 196 && box.isEmpty()) in.fail("a surface without a boundary has no end");
+      if (e.type == 190) return plane_patch(f, {box.min().head<2>(), box.max().head<2>()});
+      return to_surface(s, f, box.isEmpty() ? Interval{} : Interval{box.min().z(), box.max().z()});
+    }
+    case 114: {
+      const PowerSurface s = read_power_surface(in);
+      name = name_property(in);
+      FileSurface out;
+      out.surface = to_surface(s);
+      out.how = "parametric spline surface as B-spline surface";
+      return out;
+    }
+    case 118: {
+      const Ruled ruled = read_ruled(in);
+      name = name_property(in);
+      NaturalCurve a = natural_curve(entry(ruled.first, e, "first curve")),
+                   b = natural_curve(entry(ruled.second, e, "second curve"));
+      Eigen::Matrix3Xd both(3, a.curve.points().cols() + b.curve.points().cols());
+      both << a.curve.points(), b.curve.points();
+      return to_surface(ruled, std::move(a), std::move(b), e.form == 0, tolerance(both));
+    }
+    case 120: {
+      const Revolution revolution = read_revolution(in);
+      name = name_property(in);
+      const Curve3 axis = natural_curve(entry(revolution.axis, e, "axis")).curve;
+      return to_surface(revolution, axis, natural_curve(entry(revolution.generatrix, e, "generatrix")));
+    }
+    case 122: {
+      const Tabulated tabulated = read_tabulated(in);
+      name = name_property(in);
+      return to_surface(tabulated, natural_curve(entry(tabulated.directrix, e, "directrix")));
+    }
+    case 140: {
+      const OffsetSurface offset = read_offset_surface(in);
+      name = name_property(in);
+      std::string base_name;
+      // A boundary lies about as far along the base as along the offset.
+      const FileSurface base = surface(entry(offset.surface, e, "surface to offset"), boundaries, base_name, depth + 1);
+      return to_surface(offset, base, tolerance(base.surface.points()));
+    }
+    case 128:
+      break;
+    default:
+      throw InputError(file_.place(e) +
+                       "as a face's surface it is not read, must be 108, 114, 118, 120, 122, 128, 140, 190, 192, "
+                       "194, 196 or 198");
+  }
+  // U0 to V1 say where an untrimmed surface ends. Where a loop bounds it the loop decides, and the surface keeps its
+  // own knots and net: several exporters put the loop's bounding box there.
+  const SplineSurface spline = read_spline_surface(in);
+  name = name_property(in);
+  FileSurface out;
+  out.surface = spline.surface;
+  if (!spline.covers_domain() && trimmed) {
+    note(e, "partial", "U0 to V1 name a part of the knots' domain; the face is trimmed, so the domain stays");
+  } else if (!spline.covers_domain()) {
+    note(e, "restricted", "U0 to V1 name a part of the knots' domain; the surface is restricted to it");
+    out.surface = restricted(spline);
+    out.how = "restricted to U0, U1, V0, V1";
+  }
+  return out;
+}
+
+FileSurface Reader::surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name,
+                            int depth) {
+  const Eigen::Affine3d t = transform(e);
+  FileSurface out;
+  try {
+    out = own_surface(e, e.type == 128 || is_identity(t) ? boundaries : seen_from(t, boundaries), name, depth);
+  } catch (const GeometryError& error) {
+    throw InputError(file_.place(e) + error.what());
+  }
+  if (!is_identity(t)) out.surface = out.surface.with_points(t * out.surface.points());
+  std::string how = out.how;
+  if (out.error > 0) how += ", off by " + format_real(out.error);
+  if (out.error > 0) note(e, "fitted surface", how);
+  mark(e, how.empty() ? Disposition::read : Disposition::converted, std::move(how));
+  return out;
+}
+
+BoundaryCurves Reader::curve_on_surface(const Entry& e, int surface) {
   spend(e);
   Parameters in(file_, e, &notes_);
   const Boundary boundary = read_boundary(in);
   if (boundary.surface != 0 && boundary.surface != surface)
-    note(e, "boundary surface", "it names surface " + std::to_string(boundary.surface) + ", its face names " +
-                                    std::to_string(surface) + "; the face's is taken");
+    note(e, "boundary surface",
+         "it names surface " + std::to_string(boundary.surface) + ", its face names " + std::to_string(surface) +
+             "; the face's is taken");
   if (boundary.parameter_curve == 0 && boundary.model_curve == 0)
     in.fail("it has neither a parameter curve nor a model curve");
-
-  std::vector<Piece> model;
+  BoundaryCurves out;
+  out.place = file_.place(e);
+  std::string lost;
   if (boundary.model_curve != 0) {
     try {
-      model = curves(boundary.model_curve, e, "model curve");
-      const Eigen::Affine3d t = face_transform * transform(e);
-      for (Piece& piece : model) piece.curve = transformed(t, piece.curve);
+      out.model = curves(boundary.model_curve, e, "model curve");
+      const Eigen::Affine3d t = transform(e);
+      for (Curve3& c : out.model) c = transformed(t, c);
     } catch (const InputError& error) {
-      if (boundary.parameter_curve == 0) throw;
-      notes_.add("bad model curve", std::string(error.what()) + "; the model curve of the boundary is ignored");
-      model.clear();
+      if (boundary.parameter_curve == 0 || boundary.parameter_curve == boundary.model_curve) throw;
+      lost = std::string(error.what()) + "; the model curve of the boundary is ignored";
+      out.model.clear();
     }
   }
-
   // A parameter curve that is the model curve itself (planes of some exporters) is none.
-  std::vector<Curve2> flat;
-  std::string trouble;
-  if (boundary.parameter_curve == 0 || boundary.parameter_curve == boundary.model_curve) {
-    trouble = boundary.parameter_curve == 0 ? "there is no parameter curve" : "its parameter curve is its model curve";
-  } else {
+  if (boundary.parameter_curve != 0 && boundary.parameter_curve != boundary.model_curve) {
     try {
-      for (Piece& piece : curves(boundary.parameter_curve, e, "parameter curve")) flat.push_back(flattened(piece.curve));
-      constexpr double usable = 1e-3;  // of the domain; beyond it validation refuses a loop
-      const Fit fit = fit_of(flat, s);
-      if (fit.gap > usable) trouble = "its parameter curves don't close: gap " + format_real(fit.gap) + " of the domain";
-      if (fit.excursion > usable) trouble = "its parameter curves leave the domain by " + format_real(fit.excursion);
+      out.parameter = curves(boundary.parameter_curve, e, "parameter curve");
     } catch (const InputError& error) {
-      if (model.empty()) throw;
-      flat.clear();
-      trouble = error.what();
+      if (out.model.empty()) throw;
+      notes_.add("bad parameter curve", std::string(error.what()) + "; the parameter curve of the boundary is ignored");
+      out.parameter.clear();
     }
   }
-  if (!trouble.empty() && !model.empty()) {
-    const double size = (s.points().rowwise().maxCoeff() - s.points().rowwise().minCoeff()).norm();
-    const std::optional<AffinePatch> patch = affine_patch(s, 1e-9 * size);
-    if (patch) {
-      const std::vector<Curve2> pulled = pulled_back(model, *patch);
-      const Fit old_fit = flat.empty() ? Fit{1, 1} : fit_of(flat, s), new_fit = fit_of(pulled, s);
-      if (std::max(new_fit.gap, new_fit.excursion) < std::max(old_fit.gap, old_fit.excursion)) {
-        flat = pulled;
-        note(e, "pulled back", trouble + "; its model curve is pulled back onto the flat surface");
-        mark(e, Disposition::converted, "parameter curves from the model curve");
-        trouble.clear();
-      }
-    }
-  }
-  if (flat.empty())
-    in.fail(trouble + ", and pulling the model curve back onto a curved surface is not possible yet");
-  if (!trouble.empty()) note(e, "bad loop", trouble);
-  mark(e, Disposition::read);
-
-  TrimLoop out;
-  const bool paired = model.size() == flat.size();
-  if (!model.empty() && !paired)
-    note(e, "segment counts", std::to_string(flat.size()) + " parameter curves and " + std::to_string(model.size()) +
-                                  " model curves; the parameter curves are taken");
-  for (std::size_t i = 0; i < flat.size(); ++i) {
-    TrimCurve curve;
-    curve.curve = std::move(flat[i]);
-    curve.index = static_cast<int>(i);
-    if (paired) curve.model = std::move(model[i].curve);
-    out.curves.push_back(std::move(curve));
-  }
-  for (std::size_t i = 0; i < out.curves.size(); ++i)
-    out.gap = std::max(out.gap, (out.curves[(i + 1) % out.curves.size()].curve.start() - out.curves[i].curve.end()).norm());
+  if (!lost.empty()) notes_.add("bad model curve", lost);
   return out;
 }
 
-// U0 to V1 say where an untrimmed surface ends. Where a loop bounds it the loop decides, and the surface keeps its own
-// knots and net: several exporters put the loop's bounding box there.
-NurbsSurface Reader::surface(const Entry& e, bool trimmed, std::string& name) {
-  if (e.type != 128)
-    throw InputError(file_.place(e) + "as a face's surface it is not read yet, must be 128");
+BoundaryCurves Reader::boundary_list(const Entry& e, int surface) {
   spend(e);
   Parameters in(file_, e, &notes_);
-  const SplineSurface spline = read_spline_surface(in);
-  name = name_property(in);
-  NurbsSurface s = spline.surface;
-  bool partial = !(spline.covers_domain());
-  if (partial && trimmed) {
-    note(e, "partial", "U0 to V1 name a part of the knots' domain; the face is trimmed, so the domain stays");
-    partial = false;
-  } else if (partial) {
-    note(e, "restricted", "U0 to V1 name a part of the knots' domain; the surface is restricted to it");
-    try {
-      s = restricted(spline);
-    } catch (const GeometryError& error) {
-      in.fail(error.what());
+  const BoundaryList boundary = read_boundary_list(in);
+  if (boundary.surface != 0 && boundary.surface != surface)
+    note(e, "boundary surface",
+         "it names surface " + std::to_string(boundary.surface) + ", its face names " + std::to_string(surface) +
+             "; the face's is taken");
+  BoundaryCurves out;
+  out.place = file_.place(e);
+  const Eigen::Affine3d t = transform(e);
+  bool every_edge = true;
+  for (const BoundaryUse& use : boundary.curves) {
+    std::vector<Curve3> model = use.model != 0 ? curves(use.model, e, "model curve") : std::vector<Curve3>{};
+    if (use.sense == 2) {
+      std::reverse(model.begin(), model.end());
+      for (Curve3& c : model) c = reversed(c);
+    }
+    for (const Curve3& c : model) out.model.push_back(transformed(t, c));
+    every_edge = every_edge && !use.parameter_curves.empty();
+    for (const int sequence : use.parameter_curves) {
+      if (sequence == use.model) {
+        every_edge = false;
+        continue;
+      }
+      for (Curve3& c : curves(sequence, e, "parameter curve")) out.parameter.push_back(std::move(c));
     }
   }
+  if (!every_edge) out.parameter.clear();
+  if (out.model.empty() && out.parameter.empty()) in.fail("it has neither parameter curves nor model curves");
+  mark(e, Disposition::read);
+  return out;
+}
+
+const EdgeList& Reader::edges_of(const Entry& e) {
+  const auto found = edge_lists_.find(e.sequence);
+  if (found != edge_lists_.end()) return found->second;
+  Parameters in(file_, e, &notes_);
+  const EdgeList& list = edge_lists_[e.sequence] = read_edge_list(in);
+  mark(e, Disposition::read);
+  std::set<int> vertex_lists;
+  for (const Edge& edge : list.edges) vertex_lists.insert({edge.vertices[0], edge.vertices[2]});
+  for (const int sequence : vertex_lists)
+    if (const Entry* vertices = file_.find(sequence); vertices && vertices->type == 502)
+      mark(*vertices, Disposition::read);
+  return list;
+}
+
+BoundaryCurves Reader::edge_loop(const Entry& e) {
+  spend(e);
+  Parameters in(file_, e, &notes_);
+  const EdgeLoop loop = read_edge_loop(in);
+  BoundaryCurves out;
+  out.place = file_.place(e);
   const Eigen::Affine3d t = transform(e);
-  if (!is_identity(t)) s = s.with_points(t * s.points());
-  mark(e, partial ? Disposition::converted : Disposition::read, partial ? "restricted to U0, U1, V0, V1" : "");
-  return s;
+  bool every_edge = true;
+  for (const EdgeUse& use : loop.edges) {
+    for (const EdgeUse::ParameterCurve& curve : use.curves)
+      for (Curve3& c : curves(curve.curve, e, "parameter curve")) out.parameter.push_back(std::move(c));
+    // A vertex is a collapsed edge: it has a parameter curve or none, never a model curve.
+    if (use.vertex) continue;
+    every_edge = every_edge && !use.curves.empty();
+    const Entry& list = entry(use.list, e, "edge list", 504);
+    const std::vector<Edge>& edges = edges_of(list).edges;
+    if (use.index < 1 || use.index > static_cast<int>(edges.size()))
+      in.fail("it names edge " + std::to_string(use.index) + " of a list of " + std::to_string(edges.size()));
+    std::vector<Curve3> model = curves(edges[static_cast<std::size_t>(use.index) - 1].curve, list, "curve of an edge");
+    if (!use.forward) {
+      std::reverse(model.begin(), model.end());
+      for (Curve3& c : model) c = reversed(c);
+    }
+    for (const Curve3& c : model) out.model.push_back(transformed(t, c));
+  }
+  if (!every_edge) out.parameter.clear();
+  mark(e, Disposition::read);
+  return out;
 }
 
 // What follows an entity's own parameters: associativities, then properties; the first 406 form 15 among them.
@@ -299,39 +532,109 @@ std::string Reader::name_property(Parameters& in) {
   return name;
 }
 
-TrimmedSurface Reader::face(const Entry& e) {
+// The panels of one face in its own definition space: its own 124 and its placement come later.
+std::vector<TrimmedSurface> Reader::face(const Entry& e) {
   Parameters in(file_, e, &notes_);
-  const Face record = read_face(in);
-  TrimmedSurface out;
-  out.name = name_property(in);
-  const Eigen::Affine3d t = transform(e);
-  const Entry& support = entry(record.surface, e, "surface");
+  std::vector<BoundaryCurves> boundaries;
+  std::vector<const Entry*> entries;
+  FaceOptions options;
+  options.resolution = file_.global.resolution;
+  options.note = [this](const std::string& kind, const std::string& message) { notes_.add(kind, message); };
+  int support = e.sequence;  // a free surface is its own
+  bool bounded_by_domain = false;
+  std::string name;
+  const auto add = [&](BoundaryCurves curves, const Entry& from) {
+    boundaries.push_back(std::move(curves));
+    entries.push_back(&from);
+  };
+  if (e.type == 144) {
+    const Face record = read_face(in);
+    name = name_property(in);
+    support = record.surface;
+    bounded_by_domain = record.outer == 0;
+    if (record.outer_was_denied) note(e, "N1", "N1 is 0 though an outer boundary is given; the boundary is taken");
+    std::vector<int> loops = record.holes;
+    if (record.outer != 0) loops.insert(loops.begin(), record.outer);
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+      const char* role = i == 0 && record.outer != 0 ? "outer boundary" : "inner boundary";
+      const Entry& from = entry(loops[i], e, role);
+      if (from.type == 141) {
+        note(e, "141 in 144", "its boundary is an entity 141, must be 142; it is read as one");
+        add(boundary_list(from, support), from);
+      } else if (from.type == 142) {
+        add(curve_on_surface(from, support), from);
+      } else {
+        throw InputError(file_.place(from) + "as a boundary of a trimmed surface it must be entity 142");
+      }
+    }
+  } else if (e.type == 143) {
+    const BoundedSurface record = read_bounded_surface(in);
+    name = name_property(in);
+    support = record.surface;
+    options.outer_known = false;
+    for (const int sequence : record.boundaries) {
+      const Entry& from = entry(sequence, e, "boundary");
+      if (from.type == 142) {
+        note(e, "142 in 143", "its boundary is an entity 142, must be 141; it is read as one");
+        add(curve_on_surface(from, support), from);
+      } else {
+        add(boundary_list(entry(sequence, e, "boundary", 141), support), from);
+      }
+    }
+  } else if (e.type == 510) {
+    const TopologicalFace record = read_topological_face(in);
+    name = name_property(in);
+    support = record.surface;
+    options.outer_known = record.outer_first;
+    for (const int sequence : record.loops) {
+      const Entry& from = entry(sequence, e, "loop", 508);
+      BoundaryCurves curves = edge_loop(from);
+      // A loop that is one vertex bounds nothing: a whole sphere.
+      if (curves.model.empty() && curves.parameter.empty()) continue;
+      add(std::move(curves), from);
+    }
+  }
   std::string surface_name;
-  out.surface = surface(support, record.outer != 0, surface_name);
-  if (out.name.empty()) out.name = surface_name;
-  if (!is_identity(t)) out.surface = out.surface.with_points(t * out.surface.points());
-  if (record.outer_was_denied) note(e, "N1", "N1 is 0 though an outer boundary is given; the boundary is taken");
-  if (record.outer != 0) {
-    out.loops.push_back(loop(entry(record.outer, e, "outer boundary"), record.surface, out.surface, t));
-  } else {
-    out.loops.push_back(natural_loop(out.surface));
-    out.natural_bounds = record.holes.empty();
+  FileSurface base = surface(entry(support, e, "surface"), boundaries, surface_name);
+  if (name.empty()) name = surface_name;
+  std::vector<TrimmedSurface> panels;
+  if (boundaries.empty() || bounded_by_domain) {
+    TrimmedSurface whole;
+    whole.surface = base.surface;
+    whole.loops.push_back(natural_loop(base.surface));
+    whole.natural_bounds = boundaries.empty();
+    if (!boundaries.empty()) {
+      // Every loop is a hole in the domain: as if its border were given.
+      std::vector<BoundaryCurves> all(1);
+      all[0].place = file_.place(e);
+      for (const TrimCurve& c : whole.loops[0].curves) {
+        Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 2);
+        points.topRows<2>() = c.curve.points();
+        all[0].parameter.emplace_back(c.curve.knots(), std::move(points));
+      }
+      all.insert(all.end(), std::make_move_iterator(boundaries.begin()), std::make_move_iterator(boundaries.end()));
+      boundaries = std::move(all);
+      entries.insert(entries.begin(), &e);
+    } else {
+      panels.push_back(std::move(whole));
+    }
   }
-  for (int hole : record.holes) {
-    out.loops.push_back(loop(entry(hole, e, "inner boundary"), record.surface, out.surface, t));
-    out.loops.back().kind = LoopKind::hole;
+  if (panels.empty()) {
+    try {
+      panels = make_faces(base, boundaries, options);
+    } catch (const GeometryError& error) {
+      throw InputError(error.what());
+    }
   }
-  for (std::size_t i = 0; i < out.loops.size(); ++i) out.loops[i].index = static_cast<int>(i);
-  mark(e, Disposition::read);
-  return out;
-}
-
-TrimmedSurface Reader::free_surface(const Entry& e) {
-  TrimmedSurface out;
-  out.surface = surface(e, false, out.name);
-  out.loops.push_back(natural_loop(out.surface));
-  out.natural_bounds = true;
-  return out;
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    mark(*entries[i], boundaries[i].converted.empty() ? Disposition::read : Disposition::converted,
+         boundaries[i].converted);
+  for (std::size_t i = 0; i < panels.size(); ++i) {
+    panels[i].name = i == 0 || name.empty() ? name : name + " (" + std::to_string(i + 1) + ")";
+    for (std::size_t k = 0; k < panels[i].loops.size(); ++k) panels[i].loops[k].index = static_cast<int>(k);
+  }
+  if (e.sequence != support) mark(e, Disposition::read);
+  return panels;
 }
 
 // Surfaces that another entity is made of. Groups and properties don't use what they name.
@@ -340,23 +643,32 @@ void Reader::find_used_surfaces(std::set<int>& used) {
   for (const Entry& e : file_.entries) {
     int parameter = 0;  // where the pointer to a surface stands
     switch (e.type) {
+      case 114:
+      case 118:
+      case 120:
+      case 122:
       case 128:
+      case 140:
         if (e.subordinate == 1 || e.subordinate == 3) doubtful.push_back(e.sequence);
+        if (e.type != 140) continue;
+        parameter = 5;
+        break;
+      case 144:
+      case 510:
+        parameter = 1;
+        break;
+      case 142:
+      case 143:
+        parameter = 2;
+        break;
+      case 141:
+        parameter = 3;
+        break;
+      default:
         continue;
-      case 144: case 510: parameter = 1; break;
-      case 142: case 143: parameter = 2; break;
-      case 141: parameter = 3; break;
-      case 140: parameter = 5; break;
-      default: continue;
     }
-    try {
-      Parameters in(file_, e);
-      if (parameter >= in.size()) continue;
-      const std::optional<int> pointer = parse_integer(in.token(parameter).text);
-      if (pointer) used.insert(*pointer);
-    } catch (const InputError&) {
-      // The face itself is quarantined for this, with the message.
-    }
+    const std::optional<int> pointer = nth_integer(file_, e, parameter);
+    if (pointer) used.insert(*pointer);
   }
   std::erase_if(doubtful, [&](int sequence) { return used.count(sequence) != 0; });
   if (doubtful.empty()) return;
@@ -368,6 +680,153 @@ void Reader::find_used_surfaces(std::set<int>& used) {
       const std::optional<int> pointer = token.is_string ? std::nullopt : parse_integer(token.text);
       if (pointer && std::binary_search(doubtful.begin(), doubtful.end(), *pointer)) used.insert(*pointer);
     }
+  }
+}
+
+// Faces, surfaces that nobody uses, and what holds such.
+void Reader::expand(const Entry& e, const Eigen::Affine3d& placement, int depth, std::vector<Job>& jobs) {
+  if (depth > max_depth) throw InputError(file_.place(e) + "its instances form a cycle");
+  if (jobs.size() > 4 * file_.entries.size() + 10000) throw InputError(file_.place(e) + "its instances are too many");
+  switch (e.type) {
+    case 114:
+    case 118:
+    case 120:
+    case 122:
+    case 128:
+    case 140:
+      if (used_surfaces_.count(e.sequence) != 0) return;
+      [[fallthrough]];
+    case 143:
+    case 144:
+    case 510:
+      jobs.push_back({&e, placement});
+      return;
+    case 186: {
+      spend(e);
+      Parameters in(file_, e, &notes_);
+      const Eigen::Affine3d t = placement * transform(e);
+      for (const Use& use : read_solid(in).shells) expand(entry(use.sequence, e, "shell", 514), t, depth + 1, jobs);
+      break;
+    }
+    case 514: {
+      spend(e);
+      Parameters in(file_, e, &notes_);
+      const Eigen::Affine3d t = placement * transform(e);
+      for (const Use& use : read_shell(in).faces) expand(entry(use.sequence, e, "face", 510), t, depth + 1, jobs);
+      break;
+    }
+    case 408: {
+      spend(e);
+      Parameters in(file_, e, &notes_);
+      const Instance instance = read_instance(in);
+      const Entry& definition = entry(instance.definition, e, "subfigure definition", 308);
+      const Eigen::Affine3d t = placement * transform(e) * iges::placement(instance);
+      Parameters members(file_, definition, &notes_);
+      for (const int member : read_definition(members).members)
+        expand(entry(member, definition, "member"), t, depth + 1, jobs);
+      mark(definition, Disposition::read);
+      break;
+    }
+    case 402: {
+      if (depth == 0 || !is_group(e)) return;  // elsewhere the members stand for themselves
+      spend(e);
+      Parameters in(file_, e, &notes_);
+      for (const int member : read_group(in)) expand(entry(member, e, "member"), placement, depth + 1, jobs);
+      break;
+    }
+    default:
+      return;
+  }
+  mark(e, Disposition::read);
+}
+
+void Reader::find_faces(std::vector<Job>& jobs) {
+  find_used_surfaces(used_surfaces_);
+  // What a definition, a shell or a solid holds appears where those put it.
+  std::set<int> held;
+  const auto hold = [&](const Entry& e, auto&& members) {
+    try {
+      for (const int member : members()) {
+        held.insert(member);
+        // A group within a definition holds its members too.
+        const Entry* group = e.type == 308 ? file_.find(member) : nullptr;
+        if (!group || !is_group(*group)) continue;
+        Parameters in(file_, *group);
+        for (const int inner : read_group(in)) held.insert(inner);
+      }
+    } catch (const InputError& error) {
+      quarantine(e, error.what());
+    }
+  };
+  const auto sequences = [](const std::vector<Use>& uses) {
+    std::vector<int> out;
+    for (const Use& use : uses) out.push_back(use.sequence);
+    return out;
+  };
+  for (const Entry& e : file_.entries) {
+    const auto reader = [&](auto&& read) {
+      return [&, read] {
+        Parameters in(file_, e);
+        return read(in);
+      };
+    };
+    if (e.type == 308) hold(e, reader([](Parameters& in) { return read_definition(in).members; }));
+    if (e.type == 186) hold(e, reader([&](Parameters& in) { return sequences(read_solid(in).shells); }));
+    if (e.type == 514) hold(e, reader([&](Parameters& in) { return sequences(read_shell(in).faces); }));
+    if (e.type == 402 && is_group(e)) {
+      try {
+        Parameters in(file_, e);
+        read_group(in);
+        mark(e, Disposition::read);
+      } catch (const InputError& error) {
+        quarantine(e, error.what());
+      }
+    }
+  }
+  for (const Entry& e : file_.entries) {
+    if (held.count(e.sequence) != 0) continue;
+    const std::size_t before = jobs.size();
+    try {
+      expand(e, Eigen::Affine3d::Identity(), 0, jobs);
+    } catch (const InputError& error) {
+      jobs.resize(before, Job{nullptr, Eigen::Affine3d::Identity()});
+      quarantine(e, error.what());
+    }
+  }
+}
+
+void Reader::quarantine(const Entry& e, const std::string& why) {
+  LedgerEntry& row = out_.ledger[static_cast<std::size_t>((e.sequence - 1) / 2)];
+  row.disposition = Disposition::quarantined;
+  row.why = why;
+  notes_.add("quarantine " + std::to_string(e.sequence), why + " (directory entry " + std::to_string(e.sequence) +
+                                                             ", entity " + std::to_string(e.type) + ", is left out)");
+  if (first_failure_.empty()) first_failure_ = why;
+}
+
+void Reader::add_panels(const Job& job) {
+  const Entry& e = *job.entry;
+  try {
+    // A surface of its own has its matrix applied on reading.
+    const bool face_entity = e.type == 143 || e.type == 144 || e.type == 510;
+    const Eigen::Affine3d t = face_entity ? Eigen::Affine3d(job.placement * transform(e)) : job.placement;
+    for (TrimmedSurface& panel : face(e)) {
+      if (!is_identity(t)) {
+        panel.surface = panel.surface.with_points(t * panel.surface.points());
+        for (TrimLoop& loop : panel.loops)
+          for (TrimCurve& c : loop.curves)
+            if (c.model) c.model = transformed(t, *c.model);
+      }
+      panel.metres_per_unit = out_.metres_per_unit;
+      panel.resolution = out_.resolution;
+      panel.source = file_.name + ":" + std::to_string(e.line) + ": entity " + std::to_string(e.type);
+      out_.panels.push_back(std::move(panel));
+      labels_.push_back(e.label);
+    }
+  } catch (const InputError& error) {
+    quarantine(e, error.what());  // its parts may be read; the face is not there
+  } catch (const GeometryError& error) {
+    quarantine(e, file_.place(e) + error.what());
   }
 }
 
@@ -385,82 +844,80 @@ void Reader::finish_names() {
   }
 }
 
-void Reader::finish_panel(TrimmedSurface panel, const Entry& e) {
-  panel.metres_per_unit = out_.metres_per_unit;
-  panel.resolution = out_.resolution;
-  panel.source = file_.name + ":" + std::to_string(e.line) + ": entity " + std::to_string(e.type);
-  out_.panels.push_back(std::move(panel));
-}
-
 bool Reader::holds_faces() const {
-  constexpr std::array<int, 19> types{108, 114, 118, 120, 122, 128, 140, 141, 142, 143, 144, 186, 190, 192, 194, 196, 198, 510, 514};
-  return std::ranges::any_of(file_.entries, [&](const Entry& e) { return std::ranges::find(types, e.type) != types.end(); });
+  constexpr std::array<int, 19> types{108, 114, 118, 120, 122, 128, 140, 141, 142, 143,
+                                      144, 186, 190, 192, 194, 196, 198, 510, 514};
+  return std::ranges::any_of(file_.entries,
+                             [&](const Entry& e) { return std::ranges::find(types, e.type) != types.end(); });
 }
 
 // A drawing without any face: closed plane outlines are panels. (iges.md, 12)
 void Reader::read_outlines() {
-  std::set<int> parts;  // of composite curves
+  std::set<int> parts;  // of composite curves and of definitions
   for (const Entry& e : file_.entries) {
-    if (e.type != 102) continue;
+    if (e.type != 102 && e.type != 308) continue;
     try {
       Parameters in(file_, e);
-      for (const int sequence : read_composite(in)) parts.insert(sequence);
+      for (const int sequence : e.type == 102 ? read_composite(in) : read_definition(in).members)
+        parts.insert(sequence);
     } catch (const InputError&) {
-      // Reported below, where the curve is read.
+      // Reported where the entity itself is read.
     }
   }
-  std::map<std::string, int> labels;
+  std::map<std::string, int> names;
   std::vector<LooseCurve> curves;
   std::vector<LoosePoint> points;
   for (const Entry& e : file_.entries) {
     const Kind* kind = find_kind(e.type);
-    const bool curve = e.type == 102 || (kind && kind->curve);
-    const bool copious_points = e.type == 106 && e.form >= 1 && e.form <= 3;
+    const bool curve = e.type == 102 || e.type == 130 || (kind && kind->curve);
     const bool drawing = e.type == 106 && e.form >= 20 && e.form != 63;  // centre lines, hatching, witness lines
     if (parts.count(e.sequence) != 0 || drawing || !(curve || e.type == 116 || e.type == 212)) continue;
     try {
       Parameters in(file_, e, &notes_);
-      const Eigen::Affine3d t = transform(e);
       const auto add_point = [&](const Eigen::Vector3d& at, const std::string& words) {
-        points.push_back({e.sequence, e.label, t * at, words});
+        points.push_back({e.sequence, e.label, transform(e) * at, words});
         mark(e, Disposition::read);
       };
       if (e.type == 116) {
-        Eigen::Vector3d at;
-        for (int axis = 0; axis < 3; ++axis) at[axis] = in.real("coordinate of the point");
-        add_point(at, "");
+        add_point(read_point(in).x, "");
       } else if (e.type == 212) {
         for (const NoteString& line : read_note(in)) add_point(line.at, line.text);
-      } else if (copious_points) {
+      } else if (e.type == 106 && e.form <= 3) {
         const CopiousData data = read_copious(in);
         const std::size_t width = data.kind == 1 ? 2 : data.kind == 2 ? 3 : 6;
-        for (std::size_t k = 0; k < data.numbers.size(); k += width)
+        for (std::size_t k = 0; k + width <= data.numbers.size(); k += width)
           add_point({data.numbers[k], data.numbers[k + 1], data.kind == 1 ? data.height : data.numbers[k + 2]}, "");
       } else {
-        LooseCurve loose{e.sequence, {}, {}};
-        for (Piece& piece : this->curves(e.sequence, e, "curve")) loose.pieces.push_back(std::move(piece.curve));
-        if (e.type != 102) kind->curve(in);  // moves to the pointers behind the parameters
-        else read_composite(in);
-        loose.name = name_property(in);
+        LooseCurve loose{e.sequence, {}, this->curves(e.sequence, e, "curve")};
+        // The pointers to properties stand behind the entity's own parameters.
+        if (kind && kind->curve) {
+          kind->curve(in);
+          loose.name = name_property(in);
+        } else if (e.type == 102) {
+          read_composite(in);
+          loose.name = name_property(in);
+        }
         if (loose.name.empty()) loose.name = e.label;
-        ++labels[loose.name];
+        ++names[loose.name];
         curves.push_back(std::move(loose));
       }
     } catch (const Error& error) {
-      mark(e, Disposition::quarantined, error.what());
-      notes_.add("outline " + std::to_string(e.sequence), std::string(error.what()) + "; it is left out");
+      quarantine(e, error.what());
     }
   }
   if (curves.empty()) return;
   Outlines found = find_outlines(std::move(curves), points, out_.resolution);
-  for (const OutlineNote& n : found.notes) note(*file_.find(n.id), n.what.substr(0, n.what.find_first_of("0123456789(")), n.what);
+  for (const OutlineNote& n : found.notes) note(*file_.find(n.id), "outline " + n.what, n.what);
   for (std::size_t k = 0; k < found.panels.size(); ++k) {
     TrimmedSurface& panel = found.panels[k];
     const Entry& e = *file_.find(found.ids[k]);
-    // A label that every entity carries ("LINE", "COMPCURV") is no name.
+    // A label that many entities carry ("LINE", "COMPCURV") is no name.
+    if (names[panel.name] > 1) panel.name.clear();
     labels_.push_back({});
-    if (labels[panel.name] > 1) panel.name.clear();
-    finish_panel(std::move(panel), e);
+    panel.metres_per_unit = out_.metres_per_unit;
+    panel.resolution = out_.resolution;
+    panel.source = file_.name + ":" + std::to_string(e.line) + ": entity " + std::to_string(e.type);
+    out_.panels.push_back(std::move(panel));
   }
 }
 
@@ -476,30 +933,16 @@ void Reader::read() {
   std::map<int, int> unread;
   for (const Entry& e : file_.entries) {
     ++out_.entities[e.type];
-    if (!find_kind(e.type)) ++unread[e.type];
-    out_.ledger.push_back({e.sequence, e.line, e.type, e.form, Disposition::kept, {}});
+    const bool known = find_kind(e.type) != nullptr;
+    if (!known) ++unread[e.type];
+    out_.ledger.push_back({e.sequence, e.line, e.type, e.form, Disposition::kept,
+                           known ? "no face uses it" : "not known here; its record is kept as it stands"});
   }
-
-  std::set<int> used;
-  find_used_surfaces(used);
-  std::string first_failure;
-  for (const Entry& e : file_.entries) {
-    const bool is_face = e.type == 144;
-    if (!is_face && !(e.type == 128 && used.count(e.sequence) == 0)) continue;
-    try {
-      finish_panel(is_face ? face(e) : free_surface(e), e);
-      labels_.push_back(e.label);
-    } catch (const InputError& error) {
-      // Its parts may be read; the face is not there.
-      out_.ledger[static_cast<std::size_t>((e.sequence - 1) / 2)].disposition = Disposition::quarantined;
-      out_.ledger[static_cast<std::size_t>((e.sequence - 1) / 2)].why = error.what();
-      notes_.add("quarantine " + std::to_string(e.sequence), std::string(error.what()) + " (face of directory entry " +
-                                                                  std::to_string(e.sequence) + " is left out)");
-      if (first_failure.empty()) first_failure = error.what();
-    }
-  }
-  if (out_.panels.empty() && !first_failure.empty()) throw InputError(first_failure);
+  std::vector<Job> jobs;
+  find_faces(jobs);
+  for (const Job& job : jobs) add_panels(job);
   if (!holds_faces()) read_outlines();
+  if (out_.panels.empty() && !first_failure_.empty()) throw InputError(first_failure_);
   finish_names();
   out_.warnings = notes_.list();
   for (const auto& [type, count] : unread)

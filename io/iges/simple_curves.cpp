@@ -25,13 +25,26 @@ void write(const Arc& arc, Record& out) {
   for (const Eigen::Vector2d& point : {arc.centre, arc.start, arc.end}) out.real(point.x()).real(point.y());
 }
 
-Curve3 to_curve(const Arc& arc) {
+Interval arc_angles(const Arc& arc) {
   const Eigen::Vector2d a = arc.start - arc.centre, b = arc.end - arc.centre;
-  const double from = std::atan2(a.y(), a.x());
-  double to = std::atan2(b.y(), b.x());
-  if (arc.start == arc.end || to <= from) to += 2 * std::numbers::pi;
-  if (arc.start == arc.end) to = from + 2 * std::numbers::pi;
-  const Curve2 flat = circular_arc(arc.centre, a.norm(), from, to);
+  Interval angles{std::atan2(a.y(), a.x()), std::atan2(b.y(), b.x())};
+  if (angles.min < 0) {
+    angles.min += 2 * std::numbers::pi;
+    angles.max += 2 * std::numbers::pi;
+  }
+  if (arc.start == arc.end) {
+    angles.max = angles.min + 2 * std::numbers::pi;
+  } else if (angles.max <= angles.min) {
+    angles.max += 2 * std::numbers::pi;
+  } else if (angles.length() > 2 * std::numbers::pi) {
+    angles.max -= 2 * std::numbers::pi;
+  }
+  return angles;
+}
+
+Curve3 to_curve(const Arc& arc) {
+  const Interval angles = arc_angles(arc);
+  const Curve2 flat = circular_arc(arc.centre, (arc.start - arc.centre).norm(), angles.min, angles.max);
   Eigen::Matrix3Xd points(3, flat.points().cols());
   points.topRows<2>() = flat.points();
   // The ends are the file's own numbers.
@@ -74,15 +87,21 @@ void write(const CopiousData& data, Record& out) {
   for (double number : data.numbers) out.real(number);
 }
 
-Curve3 to_curve(const CopiousData& data) {
-  const int width = data.kind == 1 ? 2 : data.kind == 2 ? 3 : 6;
-  const int n = static_cast<int>(data.numbers.size()) / width;
+Curve3 to_curve(const CopiousData& data, bool closed) {
+  const std::size_t width = data.kind == 1 ? 2 : data.kind == 2 ? 3 : 6;
+  std::vector<Eigen::Vector3d> places;
+  for (std::size_t at = 0; at + width <= data.numbers.size(); at += width) {
+    const Eigen::Vector3d x(data.numbers[at], data.numbers[at + 1],
+                            data.kind == 1 ? data.height : data.numbers[at + 2]);
+    if (places.empty() || x != places.back()) places.push_back(x);
+  }
+  if (closed && !places.empty() && places.back() != places.front()) places.push_back(places.front());
+  const auto n = static_cast<int>(places.size());
   if (n < 2) throw GeometryError("a polyline needs two points, there is one");
   Eigen::Matrix3Xd points(3, n);
   std::vector<double> knots{0};
   for (int i = 0; i < n; ++i) {
-    const double* at = data.numbers.data() + static_cast<std::ptrdiff_t>(width) * i;
-    points.col(i) = Eigen::Vector3d(at[0], at[1], data.kind == 1 ? data.height : at[2]);
+    points.col(i) = places[static_cast<std::size_t>(i)];
     knots.push_back(i);
   }
   knots.push_back(n - 1);

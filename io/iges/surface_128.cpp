@@ -5,6 +5,7 @@
 #include "geometry/refine.h"
 #include "io/iges/entity.h"
 #include "io/iges/splines.h"
+#include "io/iges/surfaces.h"
 
 namespace toile::iges {
 
@@ -13,7 +14,8 @@ SplineSurface read_spline_surface(Parameters& in) {
   const int m1 = in.integer("M1"), m2 = in.integer("M2");
   for (int i = 0; i < 5; ++i) in.integer("PROP");
   if (m1 < 1 || m2 < 1 || m1 > max_degree || m2 > max_degree)
-    in.fail("degrees are " + std::to_string(m1) + " and " + std::to_string(m2) + ", must be 1 to " + std::to_string(max_degree));
+    in.fail("degrees are " + std::to_string(m1) + " and " + std::to_string(m2) + ", must be 1 to " +
+            std::to_string(max_degree));
   if (k1 < m1 || k2 < m2)
     in.fail("K1, K2 are " + std::to_string(k1) + ", " + std::to_string(k2) + ", must be at least the degrees " +
             std::to_string(m1) + ", " + std::to_string(m2));
@@ -32,8 +34,8 @@ SplineSurface read_spline_surface(Parameters& in) {
     for (int axis = 0; axis < 3; ++axis) points(axis, i) = in.real("coordinate of control point", i);
   try {
     SplineSurface out;
-    out.surface = NurbsSurface(KnotVector(m1, std::move(knots_u)), KnotVector(m2, std::move(knots_v)), std::move(points),
-                               std::move(weights));
+    out.surface = NurbsSurface(KnotVector(m1, std::move(knots_u)), KnotVector(m2, std::move(knots_v)),
+                               std::move(points), std::move(weights));
     out.u = read_range(in, "U", out.surface.u());
     out.v = read_range(in, "V", out.surface.v());
     return out;
@@ -84,24 +86,15 @@ NurbsSurface restrict_u(const NurbsSurface& surface, Interval range) {
   return NurbsSurface(KnotVector(p, std::move(knots)), whole.v(), std::move(points), std::move(weights));
 }
 
-NurbsSurface transposed(const NurbsSurface& s) {
-  Eigen::Matrix3Xd points(3, s.points().cols());
-  std::vector<double> weights(s.weights().size());
-  for (int j = 0; j < s.count_v(); ++j)
-    for (int i = 0; i < s.count_u(); ++i) {
-      points.col(j + s.count_v() * i) = s.points().col(s.index(i, j));
-      if (!weights.empty()) weights[static_cast<std::size_t>(j + s.count_v() * i)] = s.weight(s.index(i, j));
-    }
-  return NurbsSurface(s.v(), s.u(), std::move(points), std::move(weights));
-}
-
 bool whole(Interval range, const KnotVector& knots) {
   return range.min == knots.domain().min && range.max == knots.domain().max;
 }
 
 }  // namespace
 
-bool SplineSurface::covers_domain() const { return whole(u, surface.u()) && whole(v, surface.v()); }
+bool SplineSurface::covers_domain() const {
+  return whole(u, surface.u()) && whole(v, surface.v());
+}
 
 NurbsSurface restricted(const SplineSurface& spline) {
   NurbsSurface out = spline.surface;
