@@ -313,7 +313,7 @@ int run_command(int argc, char** argv) {
   std::string convert_target;
   CLI::App* convert_command =
       app.add_subcommand("convert", "Panels to IGES, SVG (1:1), OBJ, PLY, STL, GLB or VTU, by the ending of OUT");
-  convert_command->add_option("IN", convert_arguments.input, "IGES or pattern JSON")->required();
+  convert_command->add_option("IN", convert_arguments.input, "IGES, pattern JSON or DXF")->required();
   convert_command->add_option("OUT", convert_target)->required();
   add_refinement(*convert_command, convert_arguments);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <numbers>
 
 #include "geometry/error.h"
 #include "io/mesh_files.h"
@@ -29,6 +30,13 @@ bool asks(const InspectOptions& options) {
 std::string new_iges(PanelFile file, const InspectOptions& options, const std::string& name, Conversion& out) {
   std::vector<OutputFace> faces;
   for (TrimmedSurface& panel : file.panels) {
+    if (!panel.marks.empty()) {
+      const std::optional<double> grain = grain_angle(panel);
+      out.warnings.push_back(fmt::format(
+          "panel '{}': its {} marks (notches, lines, texts) are not written to IGES{}", panel.name, panel.marks.size(),
+          grain ? fmt::format("; its grain line is grain_deg = {:.6g}", *grain * 180 / std::numbers::pi)
+                : std::string()));
+    }
     if (asks(options)) panel.surface = refined(panel, options);
     faces.push_back({std::move(panel), {}, 0, std::nullopt});
   }
@@ -48,6 +56,7 @@ std::string refined_iges(const PanelFile& file, const InspectOptions& options) {
   face.metres_per_unit = file.metres_per_unit;
   face.resolution = file.resolution;
   face.source = file.path;
+  face.name = "of a surface (128)";
   std::string text = format_iges(file, [&](const NurbsSurface& surface) {
     face.surface = surface;
     return refined(face, options);

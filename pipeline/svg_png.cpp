@@ -167,11 +167,14 @@ Path read_path(std::string_view data) {
 // Scan lines at five heights a pixel row; along x the cover is exact.
 void Painter::fill(const std::vector<Points>& polygons, const Vector3f& colour, float opacity, bool even_odd) {
   constexpr int samples = 5;
-  double low = 1e300, high = -1e300;
+  // The part of the picture that the polygons reach.
+  const Vector2d size(image_.width, image_.height);
+  Vector2d low = size, high = Vector2d::Zero();
   for (const Points& polygon : polygons)
-    for (const Vector2d& p : polygon) low = std::min(low, p.y()), high = std::max(high, p.y());
-  const int first = std::max(0, static_cast<int>(std::floor(std::max(low, 0.0))));
-  const int last = std::min(image_.height - 1, static_cast<int>(std::floor(std::min(high, 1e9))));
+    for (const Vector2d& p : polygon) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  low = low.cwiseMax(0), high = high.cwiseMin(size);
+  const int first = static_cast<int>(low.y()), last = std::min(image_.height - 1, static_cast<int>(high.y()));
+  const int left = static_cast<int>(low.x()), right = std::min(image_.width - 1, static_cast<int>(high.x()));
   // Edges by the row where they begin, so that a row looks at those that reach it.
   struct Edge {
     Vector2d a, b;
@@ -193,7 +196,7 @@ void Painter::fill(const std::vector<Points>& polygons, const Vector3f& colour, 
     for (; next < edges.size() && edges[next].a.y() < row + 1; ++next) active.push_back(edges[next]);
     std::erase_if(active, [&](const Edge& e) { return e.b.y() < row; });
     if (active.empty()) continue;
-    std::ranges::fill(cover_, 0.0f);
+    std::fill(cover_.begin() + left, cover_.begin() + std::max(left, right) + 2, 0.0f);
     std::vector<std::pair<double, int>> meets;
     for (int k = 0; k < samples; ++k) {
       const double y = row + (k + 0.5) / samples;
@@ -221,7 +224,7 @@ void Painter::fill(const std::vector<Points>& polygons, const Vector3f& colour, 
         }
       }
     }
-    for (int x = 0; x < image_.width; ++x)
+    for (int x = left; x <= right; ++x)
       if (cover_[static_cast<std::size_t>(x)] > 0)
         image_.blend(x, row, colour, opacity * std::min(1.0f, cover_[static_cast<std::size_t>(x)]));
   }

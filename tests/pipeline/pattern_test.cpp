@@ -186,9 +186,9 @@ TEST(Convert, EveryEndingWritesItsFormat) {
 
 TEST(Convert, ThePrintIsMillimetres) {
   const std::string svg = print_svg(parse_pattern(skirt_text(), "skirt.jsonc").file);
-  // Two panels of 800 mm with margins of 20 mm; the front's box takes its control points along.
-  EXPECT_NE(svg.find("width=\"1660mm\""), std::string::npos) << svg.substr(0, 200);
-  EXPECT_NE(svg.find("viewBox=\"0 0 1660 "), std::string::npos);
+  // Two panels of 800 mm in two rows, with margins of 20 mm.
+  EXPECT_NE(svg.find("width=\"840mm\""), std::string::npos) << svg.substr(0, 200);
+  EXPECT_NE(svg.find("viewBox=\"0 0 840 "), std::string::npos);
   EXPECT_NE(svg.find("100 mm"), std::string::npos);
   // The front's waist is one quadratic from (60, 0) to (-60, 0) by way of (0, -30), 10/3 mm a unit.
   EXPECT_NE(svg.find("Q420 132 220 32"), std::string::npos) << svg;
