@@ -138,7 +138,13 @@ class Listener : public DL_CreationAdapter {
   explicit Listener(const std::vector<int>& lines) : lines_(lines) { blocks.push_back({}); }
   std::vector<Block> blocks;  // the first: entities outside of blocks
 
-  void processCodeValuePair(unsigned int, const std::string&) override { ++pairs_; }
+  void processCodeValuePair(unsigned int code, const std::string&) override {
+    if (code == 0) {
+      begin_ = newest_;
+      newest_ = pairs_;
+    }
+    ++pairs_;
+  }
   void addBlock(const DL_BlockData& data) override {
     blocks.push_back({data.name, line(), {}});
     current_ = blocks.size() - 1;
@@ -173,8 +179,8 @@ class Listener : public DL_CreationAdapter {
   }
 
  private:
-  // Pairs are counted as they are read: an entity is announced when the next one begins.
-  int line() const { return lines_.empty() ? 0 : lines_[std::min(pairs_, lines_.size()) - (pairs_ > 0 ? 1 : 0)]; }
+  // An entity is announced when the next one begins.
+  int line() const { return begin_ < lines_.size() ? lines_[begin_] : 0; }
   Item& item() {
     Block& block = blocks[current_];
     block.items.push_back({line(), attributes.getLayer(), {}, {}, {}, {}});
@@ -186,7 +192,7 @@ class Listener : public DL_CreationAdapter {
   }
 
   const std::vector<int>& lines_;
-  std::size_t pairs_ = 0, current_ = 0;
+  std::size_t pairs_ = 0, newest_ = 0, begin_ = 0, current_ = 0;
   Item* item_ = nullptr;  // the newest; polyline vertices follow at once
 };
 

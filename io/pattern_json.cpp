@@ -229,7 +229,11 @@ void PatternReader::panel(const std::string& name, const JsonValue& value) {
   if (last != first)
     fail(edges, "its edges don't close: they end at (" + text(last.x()) + ", " + text(last.y()) + ") and start at (" +
                     text(first.x()) + ", " + text(first.y()) + ")");
-  std::erase_if(loops, [](const auto& loop) { return loop.empty(); });
+  for (int k = static_cast<int>(loops.size()) - 1; k >= 0; --k) {
+    if (!loops[static_cast<std::size_t>(k)].empty()) continue;
+    loops.erase(loops.begin() + k);  // every edge of it was without length
+    for (PatternEdge& p : places) p.loop -= p.loop > k;
+  }
   // The outer loop is number 0; it is the largest.
   if (loops.size() > 1) {
     const auto largest =

@@ -45,6 +45,11 @@ TriangleMesh read_mesh(const std::filesystem::path& path) {
                                                           aiComponent_MATERIALS | aiComponent_TEXTURES);
   std::string ending = path.extension().string();
   if (!ending.empty()) ending.erase(0, 1);
+  if (!importer.IsExtensionSupported(ending))
+    throw InputError(path.string() + ": '" + ending + "' is no mesh format that can be read; use obj, ply, stl or glb");
+  // assimp looks for the end of a PLY header for ever.
+  if (bytes.starts_with("ply") && bytes.find("end_header") == std::string::npos)
+    throw InputError(path.string() + ": no mesh: the PLY header has no end_header");
   const aiScene* scene =
       importer.ReadFileFromMemory(bytes.data(), bytes.size(),
                                   aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_JoinIdenticalVertices |

@@ -27,9 +27,9 @@ void Image::blend(int x, int y, const Vector3f& colour, float cover) {
   at(x, y) += std::clamp(cover, 0.0f, 1.0f) * (colour - at(x, y));
 }
 
-void draw_text(Image& image, float x, float y, float size, std::string_view text, const Vector3f& colour, float grow) {
+void draw_text(Image& image, float x, float y, float size, std::string_view text, const Vector3f& colour) {
   const TextStrokes strokes = text_strokes(text, size);
-  const float half_width = std::max(0.6f, size / 16) + grow;
+  const float half_width = std::max(0.6f, size / 16);
   const Vector2f origin(x, y);
   const int left = static_cast<int>(x) - 3, right = static_cast<int>(x + strokes.width) + 4;
   const int top = static_cast<int>(y - size) - 3, bottom = static_cast<int>(y + size / 2) + 4;

@@ -21,9 +21,8 @@ struct Image {
   std::vector<Eigen::Vector3f> linear;
 };
 
-// Text of digit height `size` [pixels], its baseline at y, from x to the right; strokes wider by `grow` on each side.
-void draw_text(Image& image, float x, float y, float size, std::string_view text, const Eigen::Vector3f& colour,
-               float grow = 0);
+// Text of digit height `size` [pixels], its baseline at y, from x to the right.
+void draw_text(Image& image, float x, float y, float size, std::string_view text, const Eigen::Vector3f& colour);
 float text_width(std::string_view text, float size);
 
 std::string png(const Image& image);  // sRGB, 8 bits

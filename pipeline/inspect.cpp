@@ -205,14 +205,14 @@ std::string overview(const Inspection& inspection) {
   std::size_t width = 8;
   for (const InspectedPanel& panel : inspection.panels)
     width = std::max(width, std::min<std::size_t>(24, panel.face.name.size()));
-  std::string out = fmt::format("\n  {:<{}}  {:>10}  {:>11}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", "panel", width,
+  std::string out = fmt::format("\n  {:<{}}  {:>11}  {:>11}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", "panel", width,
                                 "area m2", "perimeter m", "degree", "net", "cells in/cut/out", "loops", "points used");
   for (const InspectedPanel& panel : inspection.panels) {
     const NurbsSurface& surface = panel.face.surface;
     std::size_t curves = 0;
     for (const TrimLoop& loop : panel.face.loops) curves += static_cast<std::size_t>(curves_in_file(loop));
     out +=
-        fmt::format("  {:<{}.{}}  {:>10.6g}  {:>11.6g}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", panel.face.name, width,
+        fmt::format("  {:<{}.{}}  {:>11.6g}  {:>11.6g}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", panel.face.name, width,
                     width, area(panel), perimeter(panel),
                     fmt::format("{}x{}{}", surface.u().degree(), surface.v().degree(), surface.rational() ? "r" : ""),
                     fmt::format("{}x{}", surface.count_u(), surface.count_v()),

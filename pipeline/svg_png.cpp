@@ -7,6 +7,7 @@
 
 #include "geometry/error.h"
 #include "pipeline/image.h"
+#include "pipeline/stroke_font.h"
 #include "pipeline/svg.h"
 
 namespace toile {
@@ -256,12 +257,19 @@ void Painter::text(const SvgItem& item, const Paint& paint) {
   std::string words;
   for (const char c : item.words)
     words += static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) > 0x7e ? '?' : c;
-  const float width = text_width(words, size);
-  float x = static_cast<float>(item.at.x());
-  if (item.anchor != TextAnchor::start) x -= item.anchor == TextAnchor::middle ? width / 2 : width;
-  const auto y = static_cast<float>(item.at.y());
-  if (paint.halo) draw_text(image_, x, y, size, words, Vector3f(1, 1, 1), 1.2f);
-  draw_text(image_, x, y, size, words, paint.fill.value_or(Vector3f(0, 0, 0)));
+  const TextStrokes strokes = text_strokes(words, size);
+  Vector2d at = item.at;
+  if (item.anchor != TextAnchor::start) at.x() -= item.anchor == TextAnchor::middle ? strokes.width / 2 : strokes.width;
+  const double pen = std::max(1.1, 0.12 * item.size);
+  const auto write = [&](const Vector3f& colour, double width) {
+    for (const auto& line : strokes.lines) {
+      Points points;
+      for (const auto& p : line) points.push_back(at + p.cast<double>());
+      stroke(points, colour, width);
+    }
+  };
+  if (paint.halo) write(Vector3f(1, 1, 1), pen + 2.4);
+  write(paint.fill.value_or(Vector3f(0, 0, 0)), pen);
 }
 
 void Painter::draw(const SvgItem& item) {

@@ -8,26 +8,18 @@
 #include "geometry/error.h"
 #include "io/dxf.h"
 #include "io/file.h"
+#include "io/panel_facts.h"
 #include "support/near.h"
-#include "trimming/loops.h"
-#include "trimming/quadrature.h"
 
 namespace toile {
 namespace {
 
 using Eigen::Vector2d;
+using test::area;
+using test::count;
 
 std::string apron() {
   return read_file(std::filesystem::path(TOILE_SAMPLES) / "dxf_pieces" / "apron.dxf");
-}
-
-double area(TrimmedSurface face) {
-  validate_loops(face);
-  return measure(face, trace_trims(face)).area;
-}
-
-int count(const TrimmedSurface& face, MarkKind kind) {
-  return static_cast<int>(std::ranges::count(face.marks, kind, &PanelMark::kind));
 }
 
 TEST(Dxf, PiecesArePanelsWithTheirNames) {
@@ -37,6 +29,10 @@ TEST(Dxf, PiecesArePanelsWithTheirNames) {
   EXPECT_EQ(file.panels[0].name, "FRONT");
   EXPECT_EQ(file.panels[1].name, "STRAP");
   EXPECT_TRUE(file.warnings.empty()) << file.warnings[0];
+  // The boundary begins at the group code before the first word POLYLINE.
+  const std::string text = apron();
+  const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(text.find("POLYLINE")), '\n');
+  EXPECT_EQ(file.panels[0].source, "apron.dxf:" + std::to_string(line));
 }
 
 TEST(Dxf, OutlinesKeepTheirNumbersAndBulgesAreArcs) {

@@ -6,24 +6,17 @@
 
 #include "io/iges_corpus.h"
 #include "io/outlines.h"
+#include "io/panel_facts.h"
 #include "support/near.h"
 #include "trimming/loops.h"
-#include "trimming/quadrature.h"
 
 namespace toile {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-double area(TrimmedSurface face) {
-  validate_loops(face);
-  return measure(face, trace_trims(face)).area;
-}
-
-int count(const TrimmedSurface& face, MarkKind kind) {
-  return static_cast<int>(std::ranges::count(face.marks, kind, &PanelMark::kind));
-}
+using test::area;
+using test::count;
 
 TEST(Outlines, ClosedChainsArePanelsInnerOnesHoles) {
   const PanelFile file = test::read_corpus("outlines_only");

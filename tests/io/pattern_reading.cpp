@@ -7,15 +7,15 @@
 
 #include "geometry/error.h"
 #include "io/file.h"
+#include "io/panel_facts.h"
 #include "io/pattern_json.h"
 #include "support/near.h"
-#include "trimming/loops.h"
-#include "trimming/quadrature.h"
 
 namespace toile {
 namespace {
 
 using Eigen::Vector2d;
+using test::area;
 
 std::string corpus_text(const std::string& name) {
   return read_file(std::filesystem::path(TOILE_TEST_DATA) / "patterns" / name);
@@ -32,11 +32,6 @@ std::string panel(const std::string& curvature, const std::string& properties = 
 }
 Curve2 first_edge(const std::string& curvature, const std::string& properties = "\"units_in_meter\": 100") {
   return parse_pattern(panel(curvature, properties), "p.json").file.panels.at(0).loops.at(0).curves.at(0).curve;
-}
-
-PanelMeasure measured(TrimmedSurface face) {
-  validate_loops(face);
-  return measure(face, trace_trims(face));
 }
 
 TEST(Pattern, AQuadraticIsTheBezierThatTheFileNames) {
@@ -84,9 +79,9 @@ TEST(Pattern, ACircleEdgeIsAnArcOnTheNamedSide) {
         // Segment of a circle: r^2 (angle - sin angle) / 2, in square centimetres; the net is in millimetres.
         const double half = std::asin(std::min(1.0, chord / 2 / radius));
         const double angle = 2 * (large ? std::numbers::pi - half : half);
-        const double area = radius * radius * (angle - std::sin(angle)) / 2;
+        const double segment = radius * radius * (angle - std::sin(angle)) / 2;
         if (ratio > 0.5 && ratio < 1000) {
-          expect_near_rel(measured(face).area, 100 * area, 1e-9) << text;
+          expect_near_rel(area(face), 100 * segment, 1e-9) << text;
         }
       }
     }
@@ -101,9 +96,9 @@ TEST(Pattern, BothDialectsBecomePanelsInTheFilesOrder) {
   expect_near_rel(skirt.places[0].translate.z(), 0.2, 1e-15);
   // Trapezium of 120 and 240 over 180, less the waist's parabola (2/3 of 120 x 15), plus the hem's (2/3 of 240 x 15):
   // the control points lie 30 off their edges, the curves half of that.
-  const double area = 180 * 180 - 2.0 / 3 * 120 * 15 + 2.0 / 3 * 240 * 15;
-  expect_near_rel(measured(skirt.file.panels[0]).area * 1e-6, area / 9e4, 1e-12);
-  expect_near_rel(measured(skirt.file.panels[1]).area * 1e-6, 180 * 180 / 9e4, 1e-14);
+  const double trapezium = 180 * 180 - 2.0 / 3 * 120 * 15 + 2.0 / 3 * 240 * 15;
+  expect_near_rel(area(skirt.file.panels[0]) * 1e-6, trapezium / 9e4, 1e-12);
+  expect_near_rel(area(skirt.file.panels[1]) * 1e-6, 180 * 180 / 9e4, 1e-14);
 
   const Pattern bodice = read_corpus("bodice_and_cuff.json");
   EXPECT_TRUE(bodice.soles_at_zero);
@@ -124,7 +119,7 @@ TEST(Pattern, EdgesThatCloseEarlyBeginAHole) {
   const double hole = 8 * std::numbers::pi + 12.5 * (angle - std::sin(angle));
   TrimmedSurface filled = face;
   filled.loops.pop_back();
-  expect_near_rel(measured(filled).area - measured(face).area, 100 * hole, 1e-10);
+  expect_near_rel(area(filled) - area(face), 100 * hole, 1e-10);
 }
 
 TEST(Pattern, IgesKeepsEveryNumber) {
@@ -136,7 +131,7 @@ TEST(Pattern, IgesKeepsEveryNumber) {
     const PanelFile again = parse_iges(format_iges(file), name);
     EXPECT_EQ(again.panels[1].name, file.panels[1].name);
     EXPECT_EQ(again.unit, "MM");
-    expect_near_rel(measured(again.panels[0]).area, measured(file.panels[0]).area, 1e-14);
+    expect_near_rel(area(again.panels[0]), area(file.panels[0]), 1e-14);
   }
 }
 
@@ -151,7 +146,7 @@ TEST(Pattern, AnEdgeAgainstItsNeighboursIsTurned) {
   const TrimCurve& turned = pattern.file.panels[1].loops[0].curves[1];
   EXPECT_EQ(turned.curve.start(), Vector2d(60, 0));
   EXPECT_EQ(turned.curve.end(), Vector2d(120, -180));
-  expect_near_rel(measured(pattern.file.panels[1]).area * 1e-6, 180 * 180 / 9e4, 1e-14);
+  expect_near_rel(area(pattern.file.panels[1]) * 1e-6, 180 * 180 / 9e4, 1e-14);
 }
 
 void expect_error(const std::string& text, const std::string& message) {
