@@ -39,7 +39,7 @@ std::string trimmed(std::string_view text) {
 // what polylines, splines and hatches claim.
 struct Cut {
   std::string text;
-  std::vector<int> lines;  // of each pair that is left
+  std::vector<int> lines;  // where each entity and block begins that dxflib will announce
   std::map<std::string, int> unread;
 };
 
@@ -47,6 +47,8 @@ Cut cut(std::string_view text, const std::string& name) {
   static const std::set<std::string, std::less<>> known{"SECTION",  "ENDSEC", "EOF",    "BLOCK",  "ENDBLK",
                                                         "POLYLINE", "VERTEX", "SEQEND", "LINE",   "POINT",
                                                         "TEXT",     "ARC",    "CIRCLE", "INSERT", "LWPOLYLINE"};
+  static const std::set<std::string, std::less<>> announced{"BLOCK", "POLYLINE", "LWPOLYLINE", "LINE",
+                                                            "POINT", "TEXT",     "ARC",        "CIRCLE"};
   Cut out;
   std::string section;
   bool keep = true, ended = false;
@@ -106,7 +108,7 @@ Cut cut(std::string_view text, const std::string& name) {
         fail("group code " + code_word + " is '" + value.substr(0, 40) + "', must be a number");
     }
     out.text += code_word + "\n" + value + "\n";
-    out.lines.push_back(line - 1);
+    if (code == 0 && announced.contains(value)) out.lines.push_back(line - 1);
   }
   return out;
 }
@@ -138,15 +140,8 @@ class Listener : public DL_CreationAdapter {
   explicit Listener(const std::vector<int>& lines) : lines_(lines) { blocks.push_back({}); }
   std::vector<Block> blocks;  // the first: entities outside of blocks
 
-  void processCodeValuePair(unsigned int code, const std::string&) override {
-    if (code == 0) {
-      begin_ = newest_;
-      newest_ = pairs_;
-    }
-    ++pairs_;
-  }
   void addBlock(const DL_BlockData& data) override {
-    blocks.push_back({data.name, line(), {}});
+    blocks.push_back({data.name, next_line(), {}});
     current_ = blocks.size() - 1;
   }
   void endBlock() override { current_ = 0; }
@@ -166,9 +161,9 @@ class Listener : public DL_CreationAdapter {
   }
   void addArc(const DL_ArcData& a) override {
     double from = a.angle1 * std::numbers::pi / 180, to = a.angle2 * std::numbers::pi / 180;
-    if (!(std::abs(from) < 1e4 && std::abs(to) < 1e4)) return;
-    while (to <= from) to += 2 * std::numbers::pi;
-    while (to > from + 2 * std::numbers::pi) to -= 2 * std::numbers::pi;
+    // One turn at most, counter-clockwise.
+    to = from + std::fmod(to - from, 2 * std::numbers::pi);
+    if (to <= from) to += 2 * std::numbers::pi;
     add_circle({a.cx, a.cy}, a.radius, from, to);
   }
   void addCircle(const DL_CircleData& c) override { add_circle({c.cx, c.cy}, c.radius, 0, 2 * std::numbers::pi); }
@@ -179,20 +174,20 @@ class Listener : public DL_CreationAdapter {
   }
 
  private:
-  // An entity is announced when the next one begins.
-  int line() const { return begin_ < lines_.size() ? lines_[begin_] : 0; }
+  int next_line() { return announced_ < lines_.size() ? lines_[announced_++] : 0; }
   Item& item() {
     Block& block = blocks[current_];
-    block.items.push_back({line(), attributes.getLayer(), {}, {}, {}, {}});
+    block.items.push_back({next_line(), attributes.getLayer(), {}, {}, {}, {}});
     item_ = &block.items.back();
     return *item_;
   }
   void add_circle(const Vector2d& centre, double radius, double from, double to) {
-    if (radius > 0 && to > from) item().curve = circular_arc(centre, radius, from, to);
+    Item& arc = item();
+    if (radius > 0 && to > from) arc.curve = circular_arc(centre, radius, from, to);
   }
 
   const std::vector<int>& lines_;
-  std::size_t pairs_ = 0, newest_ = 0, begin_ = 0, current_ = 0;
+  std::size_t announced_ = 0, current_ = 0;
   Item* item_ = nullptr;  // the newest; polyline vertices follow at once
 };
 
@@ -401,7 +396,11 @@ void DxfReader::read(std::string_view text) {
   Listener listener(pairs.lines);
   DL_Dxf dxf;
   std::istringstream stream(pairs.text);
-  if (!dxf.in(stream, &listener)) throw InputError(name_ + ": dxflib could not read it");
+  try {
+    if (!dxf.in(stream, &listener)) throw InputError(name_ + ": dxflib could not read it");
+  } catch (const GeometryError& error) {
+    throw InputError(name_ + ": an arc: " + error.what());
+  }
   find_unit(listener.blocks);
   out_.resolution = out_.unit == "MM" ? 1e-3 : 1e-4;
   for (const Block& block : listener.blocks) {

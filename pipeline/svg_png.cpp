@@ -231,7 +231,8 @@ void Painter::fill(const std::vector<Points>& polygons, const Vector3f& colour, 
   }
 }
 
-// The union of its segments' rectangles and of discs at the joints, as one polygon set with nonzero winding.
+// The union of its segments' rectangles and of discs at the joints, as one polygon set with nonzero winding: all of
+// them run the same way round.
 void Painter::stroke(const Points& line, const Vector3f& colour, double width) {
   const double half = std::max(width, 0.8) / 2;
   const float strength = static_cast<float>(std::min(1.0, width / 0.8));
@@ -245,7 +246,7 @@ void Painter::stroke(const Points& line, const Vector3f& colour, double width) {
     Points disc;
     for (int m = 0; m < 12; ++m) {
       const double angle = 3.14159265358979 / 6 * m;
-      disc.push_back(line[k] + half * Vector2d(std::sin(angle), std::cos(angle)));
+      disc.push_back(line[k] + half * Vector2d(std::cos(angle), std::sin(angle)));
     }
     parts.push_back(std::move(disc));
   }

@@ -945,6 +945,9 @@ void Reader::read() {
   if (out_.panels.empty() && !first_failure_.empty()) throw InputError(first_failure_);
   finish_names();
   out_.warnings = notes_.list();
+  // Notes of a drawing are read though no record is made anew from them.
+  for (const LedgerEntry& row : out_.ledger)
+    if (row.type == 212 && row.disposition == Disposition::read && --unread[row.type] == 0) unread.erase(row.type);
   for (const auto& [type, count] : unread)
     out_.warnings.push_back("entity " + std::to_string(type) + ": " + std::to_string(count) + " kept, not read");
 }

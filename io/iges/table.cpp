@@ -63,7 +63,7 @@ Curve3 spline_curve(Parameters& in) {
   return sub_curve(s.curve, s.range);
 }
 
-constexpr std::array<Kind, 40> kinds{{
+constexpr std::array<Kind, 39> kinds{{
     {0, "null", nullptr, nullptr, false},
     {100, "circular arc", rewrite_as<read_arc>, arc_curve, true},
     {102, "composite curve", rewrite_composite, nullptr, false},
@@ -93,7 +93,6 @@ constexpr std::array<Kind, 40> kinds{{
     {194, "cone", rewrite_as<read_analytic>, nullptr, false},
     {196, "sphere", rewrite_as<read_analytic>, nullptr, false},
     {198, "torus", rewrite_as<read_analytic>, nullptr, false},
-    {212, "general note", nullptr, nullptr, false},
     {308, "subfigure definition", rewrite_as<read_definition>, nullptr, false},
     {314, "colour", rewrite_as<read_colour>, nullptr, false},
     {402, "group", rewrite_group, nullptr, false},

@@ -181,7 +181,7 @@ TEST(Convert, EveryEndingWritesItsFormat) {
   write_file(folder / "broken.json", "{\"pattern\": [\n");
   EXPECT_EQ(run(folder, "convert broken.json broken.igs"), 3);
   EXPECT_FALSE(std::filesystem::exists(folder / "broken.igs"));
-  EXPECT_NE(read_file(folder / "stderr.txt").find("broken.json:2: no valid JSON"), std::string::npos);
+  EXPECT_NE(read_file(folder / "stderr.txt").find("broken.json:1: no valid JSON"), std::string::npos);
 }
 
 TEST(Convert, ThePrintIsMillimetres) {
