@@ -27,7 +27,7 @@ constexpr double touch_tolerance = 1e-3;  // of a panel's size: a mark this near
 constexpr double notch_length = 0.05;     // of a panel's size: longer marks that touch the outline are lines
 
 std::string place(const Vector3d& x) {
-  return "(" + text(x.x()) + ", " + text(x.y()) + ", " + text(x.z()) + ")";
+  return std::string("(") + text(x.x()) + ", " + text(x.y()) + ", " + text(x.z()) + ")";
 }
 
 // Numbers for places: points nearer than the tolerance to one seen before share its number.

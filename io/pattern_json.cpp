@@ -38,8 +38,8 @@ class PatternReader {
   }
   const JsonValue& member(const JsonValue& object, const char* key, JsonValue::Kind kind) const {
     const JsonValue* found = object.find(key);
-    if (!found) fail(object, "'" + std::string(key) + "' is missing");
-    return expect(*found, kind, "'" + std::string(key) + "'");
+    if (!found) fail(object, std::string("'") + key + "' is missing");
+    return expect(*found, kind, std::string("'") + key + "'");
   }
   double number(const JsonValue& value, const std::string& what) const;
   int index(const JsonValue& value, std::size_t count, const std::string& what) const;

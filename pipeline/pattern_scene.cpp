@@ -263,7 +263,8 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
                         vector(place.translate), place.rotate_deg[0] + 0.0, place.rotate_deg[1] + 0.0,
                         place.rotate_deg[2] + 0.0);
   }
-  text += "\n" + fabric_tables();
+  text += '\n';
+  text += fabric_tables();
 
   text += "\n# Each panel hangs from its upper edges. Seams and a waistband take their place when panels are sewn.\n";
   double free_length = 0, free_height = 0;

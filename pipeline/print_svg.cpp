@@ -45,7 +45,7 @@ void append_cubics(std::string& path, const Curve2& curve, double a, double b, i
     append_cubics(path, curve, (a + b) / 2, b, depth - 1);
     return;
   }
-  path += "C" + point(c1) + " " + point(c2) + " " + point(to.x);
+  path += std::string("C") + point(c1) + " " + point(c2) + " " + point(to.x);
 }
 
 // A curve on the paper from its start, which the pen has reached.
@@ -57,7 +57,10 @@ void append_curve(std::string& path, const Curve2& curve) {
       continue;
     }
     path += degree == 1 ? "L" : degree == 2 ? "Q" : "C";
-    for (int k = 1; k <= degree; ++k) path += (k > 1 ? " " : "") + point(piece.points.col(k));
+    for (int k = 1; k <= degree; ++k) {
+      if (k > 1) path += ' ';
+      path += point(piece.points.col(k));
+    }
   }
 }
 
@@ -88,14 +91,17 @@ std::string outline(const Sheet& sheet, const TrimLoop& loop) {
   std::string path;
   for (const TrimCurve& trim : loop.curves) {
     const Curve2 curve = sheet(trim.reversed ? reversed(trim.curve) : trim.curve);
-    if (path.empty()) path = "M" + point(curve.start());
+    if (path.empty()) {
+      path += 'M';
+      path += point(curve.start());
+    }
     append_curve(path, curve);
   }
   return path + "Z";
 }
 
 std::string line_path(const Vector2d& a, const Vector2d& b) {
-  return "M" + point(a) + "L" + point(b);
+  return std::string("M") + point(a) + "L" + point(b);
 }
 
 class Paper {
@@ -112,7 +118,8 @@ class Paper {
     const Vector2d d = (to - from).normalized(), side(-d.y(), d.x());
     path(line_path(from, to), "mark");
     for (const auto& [tip, way] : {std::pair<Vector2d, Vector2d>{to, d}, {from, Vector2d(-d)}})
-      path("M" + point(tip) + "L" + point(tip - 6 * way + 2 * side) + "L" + point(tip - 6 * way - 2 * side) + "Z",
+      path(std::string("M") + point(tip) + "L" + point(tip - 6 * way + 2 * side) + "L" +
+               point(tip - 6 * way - 2 * side) + "Z",
            "solid");
   }
   void open(const std::string& name) { body_ += "<g><title>" + svg_escape(name) + "</title>\n"; }
@@ -144,7 +151,7 @@ void draw_marks(Paper& paper, const Sheet& sheet) {
       case MarkKind::notch: {
         if (mark.curve) {
           const Curve2 curve = sheet(*mark.curve);
-          std::string path = "M" + point(curve.start());
+          std::string path = std::string("M") + point(curve.start());
           append_curve(path, curve);
           paper.path(path, mark.kind == MarkKind::line ? "inner" : "mark");
         } else {

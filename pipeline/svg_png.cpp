@@ -101,7 +101,7 @@ Paint Painter::paint_of(const std::string& style, bool text) const {
       if (found == sheet_.end()) continue;
       for (const auto& [key, value] : found->second)
         if (!(text && key == "stroke")) rules[key] = value;
-      if (name == "halo") rules["halo"] = "1";
+      if (name == "halo") rules.insert_or_assign("halo", std::string("yes"));
     }
   };
   if (style.find('=') == std::string::npos) {
@@ -129,9 +129,10 @@ Paint Painter::paint_of(const std::string& style, bool text) const {
   if (!rule("fill").empty()) paint.fill = colour_of(rule("fill"));
   paint.stroke = colour_of(rule("stroke"));
   paint.opacity = static_cast<float>(number_of(rule("fill-opacity"), 1));
-  paint.width = number_of(rule("stroke-width").starts_with('.') ? "0" + std::string(rule("stroke-width"))
-                                                                : std::string(rule("stroke-width")),
-                          1);
+  // ".7" begins without its nought.
+  std::string width(rule("stroke-width"));
+  if (width.starts_with('.')) width.insert(std::size_t{0}, 1, '0');
+  paint.width = number_of(width, 1);
   paint.even_odd = rule("fill-rule") == "evenodd";
   paint.halo = !rule("halo").empty();
   return paint;
