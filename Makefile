@@ -2,7 +2,8 @@
 #   make demo     build, drape a real panel file, say where the results are
 #   make test     build with warnings as errors, run all tests
 #   make bench    benchmarks: speed as ratios and as cost against size
-#   make verify   read what we write with OpenCASCADE and compare
+#   make verify   read what we write with OpenCASCADE and compare; trace hard trims against exact arithmetic; count what
+#                 unused features cost
 #   make format   clang-format on all sources
 #   make install  to PREFIX (default /usr/local)
 PREFIX ?= /usr/local
@@ -35,6 +36,9 @@ bench: build/bench/build.ninja
 verify: build/verify/build.ninja
 	cmake --build --preset verify -j $(JOBS)
 	tests/verify/run build/verify
+	cmake --preset callgrind
+	cmake --build --preset callgrind -j $(JOBS) --target toile
+	tests/verify/instructions build/callgrind/pipeline/toile
 
 format:
 	.ci/install format

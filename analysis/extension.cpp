@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "geometry/basis.h"
 #include "geometry/error.h"
@@ -55,8 +57,19 @@ using Row = std::vector<Entry>;
 class Extender {
  public:
   Extender(const NurbsSurface& rest, const CutQuadrature& quadrature, const Eigen::VectorXd& mass,
-           const ExtensionOptions& options)
-      : rest_(rest), quadrature_(quadrature), mass_(mass), options_(options), u_(rest.u()), v_(rest.v()) {}
+           const ExtensionOptions& options, const std::vector<int>& leader)
+      : rest_(rest), quadrature_(quadrature), options_(options), u_(rest.u()), v_(rest.v()), leader_(leader) {
+    if (leader_.empty()) {
+      leader_.resize(size());
+      std::iota(leader_.begin(), leader_.end(), 0);
+    }
+    mass_ = Eigen::VectorXd::Zero(size());
+    members_.resize(size());
+    for (int k = 0; k < size(); ++k) {
+      mass_[leader_[k]] += mass[k];
+      members_[leader_[k]].push_back(k);
+    }
+  }
 
   Extension run();
 
@@ -69,7 +82,12 @@ class Extender {
   int size() const { return rest_.count_u() * rest_.count_v(); }
   void weigh();
   void find_hosts();
-  Host nearest_host(int control_point) const;
+  struct Nearest {
+    Host host;
+    int control_point;  // the member of a seam that this host is near
+  };
+  Nearest nearest_host(int leader) const;
+  std::pair<Host, double> nearest_cell(int control_point) const;
   Row polynomial_row(int control_point, Host host) const;
   Row tangent_row(int control_point, Host host) const;
   Eigen::Vector3d follow(const Row& row) const;
@@ -79,14 +97,16 @@ class Extender {
 
   const NurbsSurface& rest_;
   const CutQuadrature& quadrature_;
-  const Eigen::VectorXd& mass_;
   const ExtensionOptions& options_;
   Line u_, v_;
+  std::vector<int> leader_;
+  std::vector<std::vector<int>> members_;  // of each leader, itself first
+  Eigen::VectorXd mass_;                   // of leaders, their members' together
   std::vector<double> area_;     // of material per cell
-  std::vector<double> support_;  // part of each function's support in the material
-  std::vector<Role> role_;
+  std::vector<double> support_;  // part of each leader's support in the material
+  std::vector<Role> role_;       // members have their leader's
   std::vector<char> host_;       // cells all of whose functions stand on their own
-  std::vector<Row> rows_;        // of extended and bare control points
+  std::vector<Row> rows_;        // of extended and bare leaders, over leaders
 };
 
 void Extender::weigh() {
@@ -94,20 +114,23 @@ void Extender::weigh() {
   for (const CellRule& cell : quadrature_.cells) area_[cell.i + u_.cells() * cell.j] += cell.area;
   support_.resize(size());
   role_.resize(size());
+  std::vector<double> material(size(), 0.0), whole(size(), 0.0);
   for (int j = 0; j < rest_.count_v(); ++j)
     for (int i = 0; i < rest_.count_u(); ++i) {
-      double material = 0, whole = 0;
+      const int k = leader_[rest_.index(i, j)];
       for (int b = v_.support[j][0]; b < v_.support[j][1]; ++b)
         for (int a = u_.support[i][0]; a < u_.support[i][1]; ++a) {
-          material += area_[a + u_.cells() * b];
-          whole += u_.length(a) * v_.length(b);
+          material[k] += area_[a + u_.cells() * b];
+          whole[k] += u_.length(a) * v_.length(b);
         }
-      const int k = rest_.index(i, j);
-      support_[k] = whole > 0 ? material / whole : 0;
-      role_[k] = material <= 0                                  ? Role::bare
-                 : support_[k] < options_.smallest_support ? Role::extended
-                                                            : Role::own;
     }
+  for (int i = 0; i < size(); ++i) {
+    const int k = leader_[i];
+    support_[i] = whole[k] > 0 ? material[k] / whole[k] : 0;
+    role_[i] = material[k] <= 0                          ? Role::bare
+               : support_[i] < options_.smallest_support ? Role::extended
+                                                         : Role::own;
+  }
 }
 
 void Extender::find_hosts() {
@@ -122,7 +145,7 @@ void Extender::find_hosts() {
 }
 
 // Nearest cell centre in units of cells, ring by ring; ties go to the cell that comes first.
-Extender::Host Extender::nearest_host(int control_point) const {
+std::pair<Extender::Host, double> Extender::nearest_cell(int control_point) const {
   const double cu = u_.centre[control_point % rest_.count_u()], cv = v_.centre[control_point / rest_.count_u()];
   const int a0 = std::min(static_cast<int>(cu), u_.cells() - 1), b0 = std::min(static_cast<int>(cv), v_.cells() - 1);
   Host best;
@@ -138,7 +161,17 @@ Extender::Host Extender::nearest_host(int control_point) const {
       }
     }
   }
-  return best;
+  return {best, best_squared};
+}
+
+Extender::Nearest Extender::nearest_host(int leader) const {
+  Nearest nearest{{}, leader};
+  double best_squared = std::numeric_limits<double>::infinity();
+  for (const int member : members_[leader]) {
+    const auto [host, squared] = nearest_cell(member);
+    if (squared < best_squared) nearest = {host, member}, best_squared = squared;
+  }
+  return nearest;
 }
 
 Row Extender::polynomial_row(int control_point, Host host) const {
@@ -148,7 +181,8 @@ Row Extender::polynomial_row(int control_point, Host host) const {
   for (std::size_t b = 0; b < ev.size(); ++b)
     for (std::size_t a = 0; a < eu.size(); ++a)
       if (const double e = eu[a] * ev[b]; e != 0)
-        row.push_back({rest_.index(u_.first(host.i) + static_cast<int>(a), v_.first(host.j) + static_cast<int>(b)), e});
+        row.push_back(
+            {leader_[rest_.index(u_.first(host.i) + static_cast<int>(a), v_.first(host.j) + static_cast<int>(b))], e});
   return row;
 }
 
@@ -163,7 +197,7 @@ Row Extender::tangent_row(int control_point, Host host) const {
   Row row;
   for (int b = 0; b <= bv.degree; ++b)
     for (int a = 0; a <= bu.degree; ++a)
-      row.push_back({rest_.index(bu.first + a, bv.first + b),
+      row.push_back({leader_[rest_.index(bu.first + a, bv.first + b)],
                      bu.value[0][a] * bv.value[0][b] + du * bu.value[1][a] * bv.value[0][b] +
                          dv * bu.value[0][a] * bv.value[1][b]});
   return row;
@@ -195,15 +229,15 @@ void Extender::keep_what_moves_the_rest() {
                              quadrature_.points[q][1], basis);
       for (int b = 0; b < basis.count_v; ++b)
         for (int a = 0; a < basis.count_u; ++a) {
-          double& value = largest[rest_.index(basis.first_u + a, basis.first_v + b)];
+          double& value = largest[leader_[rest_.index(basis.first_u + a, basis.first_v + b)]];
           value = std::max(value, basis.value[0][a + basis.count_u * b]);
         }
     }
   }
   for (int k = 0; k < size(); ++k) {
-    if (role_[k] != Role::extended) continue;
+    if (role_[k] != Role::extended || leader_[k] != k) continue;
     const double move = (follow(rows_[k]) - rest_.points().col(k)).norm() * largest[k];
-    if (move > options_.largest_deviation * cell_size(nearest_host(k))) role_[k] = Role::own;
+    if (move > options_.largest_deviation * cell_size(nearest_host(k).host)) role_[k] = Role::own;
   }
 }
 
@@ -213,14 +247,14 @@ void Extender::keep_what_takes_mass() {
   std::vector<std::vector<Entry>> takers(size());
   Eigen::VectorXd reduced = mass_;
   for (int k = 0; k < size(); ++k) {
-    if (role_[k] != Role::extended) continue;
+    if (role_[k] != Role::extended || leader_[k] != k) continue;
     for (const Entry& e : rows_[k]) {
       takers[e.control_point].push_back({k, e.value * mass_[k]});
       reduced[e.control_point] += e.value * mass_[k];
     }
   }
   for (int j = 0; j < size(); ++j) {
-    if (role_[j] != Role::own) continue;
+    if (role_[j] != Role::own || leader_[j] != j) continue;
     std::sort(takers[j].begin(), takers[j].end(), [](const Entry& a, const Entry& b) {
       return a.value != b.value ? a.value < b.value : a.control_point < b.control_point;
     });
@@ -249,18 +283,18 @@ Extension Extender::run() {
 
   rows_.resize(size());
   for (int k = 0; k < size(); ++k) {
-    if (role_[k] == Role::own) continue;
-    const Host host = nearest_host(k);
+    if (role_[k] == Role::own || leader_[k] != k) continue;
+    const auto [host, member] = nearest_host(k);
     if (role_[k] == Role::bare) {
-      rows_[k] = tangent_row(k, host);
+      rows_[k] = tangent_row(member, host);
       continue;
     }
     // Further out than the degree the coefficients grow without bound: a thin part far from any good cell.
     const int p = std::max(rest_.u().degree(), rest_.v().degree());
-    if (outside(u_, host.i, k % rest_.count_u()) > p || outside(v_, host.j, k / rest_.count_u()) > p)
+    if (outside(u_, host.i, member % rest_.count_u()) > p || outside(v_, host.j, member / rest_.count_u()) > p)
       role_[k] = Role::own;
     else
-      rows_[k] = polynomial_row(k, host);
+      rows_[k] = polynomial_row(member, host);
   }
   keep_what_moves_the_rest();
   // Giving a function back returns what it added elsewhere, so a second look may be needed; each keeps at least one.
@@ -272,16 +306,18 @@ Extension Extender::run() {
   Extension out;
   std::vector<Eigen::Triplet<double>> entries;
   Eigen::Matrix3Xd net = rest_.points();
+  for (int k = 0; k < size(); ++k) role_[k] = role_[leader_[k]];  // decided for leaders only
   for (int k = 0; k < size(); ++k) {
     out.carries_cloth.push_back(role_[k] != Role::bare);
     if (role_[k] == Role::own) {
-      entries.emplace_back(k, k, 1.0);
+      entries.emplace_back(k, leader_[k], 1.0);
       if (wanted[k] == Role::extended) out.kept.push_back(k);
       continue;
     }
     if (role_[k] == Role::extended) out.extended.push_back(k);
-    for (const Entry& e : rows_[k]) entries.emplace_back(k, e.control_point, e.value);
-    net.col(k) = follow(rows_[k]);
+    const Row& row = rows_[leader_[k]];
+    for (const Entry& e : row) entries.emplace_back(k, e.control_point, e.value);
+    net.col(k) = follow(row);
   }
   out.dependence.resize(size(), size());
   out.dependence.setFromTriplets(entries.begin(), entries.end());
@@ -328,8 +364,8 @@ std::vector<double> extension_coefficients(const KnotVector& knots, int span, in
 }
 
 Extension extend(const NurbsSurface& rest, const CutQuadrature& quadrature, const Eigen::VectorXd& lumped_mass,
-                 const ExtensionOptions& options) {
-  return Extender(rest, quadrature, lumped_mass, options).run();
+                 const ExtensionOptions& options, const std::vector<int>& leader) {
+  return Extender(rest, quadrature, lumped_mass, options, leader).run();
 }
 
 Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density, double fraction) {

@@ -35,9 +35,11 @@ struct Extension {
 //   (1) row sums are 1; (2) extended rows reproduce every polynomial of the surface's degree per direction, rows without
 //   cloth every affine map; (3) reduced lumped masses are positive where `lumped_mass` is: functions whose extension
 //   would leave less than `smallest_mass` are kept.
-// `lumped_mass`: n row sums of the panel.
+// `lumped_mass`: n row sums of the panel. `leader` (seam_leaders; empty: no control point is another): control points of a
+// seam are one, whose function is the sum of theirs; rows of followers are those of their leaders, so that the seam stays
+// closed bitwise. An extended one follows the cell of one side, so law (2) holds for polynomials continued from there.
 Extension extend(const NurbsSurface& rest, const CutQuadrature& quadrature, const Eigen::VectorXd& lumped_mass,
-                 const ExtensionOptions& options = {});
+                 const ExtensionOptions& options = {}, const std::vector<int>& leader = {});
 
 // Coefficients (p+1) by which the polynomial of a nonempty span, continued, has its B-spline coefficient `function`: the
 // blossom at knots[function+1 .. function+p]. Uniform knots, p = 2: (1,-3,3) for the first function outside, (3,-8,6) for

@@ -1,5 +1,6 @@
 #include "geometry/measure.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -78,5 +79,31 @@ double surface_area(const NurbsSurface& surface, double relative_tolerance) {
 
 template Eigen::AlignedBox<double, 2> bounding_box(const NurbsCurve<2>&);
 template Eigen::AlignedBox<double, 3> bounding_box(const NurbsCurve<3>&);
+
+std::optional<Eigen::Vector3d> mean_u_direction(const NurbsSurface& surface, double flatness) {
+  constexpr int lines = 32;              // of constant v, whose chords are averaged
+  constexpr double least_chord = 0.05;   // of the lines' length
+  const Eigen::Matrix3Xd spread = surface.points().colwise() - surface.points().rowwise().mean();
+  const Eigen::Vector3d normal =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread * spread.transpose()).eigenvectors().col(0);
+  const double size = spread.colwise().norm().maxCoeff();
+  if (!((normal.transpose() * spread).cwiseAbs().maxCoeff() <= flatness * size)) return std::nullopt;
+
+  const Interval u = surface.u().domain(), v = surface.v().domain();
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double length = 0;
+  for (int k = 0; k < lines; ++k) {
+    const double at = v.min + v.length() * (k + 0.5) / lines;
+    Eigen::Vector3d last = surface(u.min, at);
+    for (int i = 1; i <= lines; ++i) {
+      const Eigen::Vector3d next = surface(i == lines ? u.max : u.min + u.length() * i / lines, at);
+      mean += next - last;
+      length += (next - last).norm();
+      last = next;
+    }
+  }
+  if (!(mean.norm() > least_chord * length)) return std::nullopt;
+  return mean.normalized();
+}
 
 }  // namespace toile

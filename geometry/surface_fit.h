@@ -22,6 +22,6 @@ struct SurfaceFit {
   double error = 0;  // largest distance found
 };
 SurfaceFit fit_surface(const std::function<Eigen::Vector3d(double u, double v)>& f, const std::vector<FitBreak>& u,
-                       const std::vector<FitBreak>& v, double tolerance, int max_spans = 256);
+                       const std::vector<FitBreak>& v, double tolerance, int max_spans = 128);
 
 }  // namespace toile

@@ -35,6 +35,27 @@ bool write_all(int fd, std::string_view bytes) {
   return true;
 }
 
+int nameless_file(const std::filesystem::path& folder) {
+#ifdef O_TMPFILE
+  if (::access("/proc/self/fd", X_OK) == 0) return ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+#endif
+  (void)folder;
+  return -1;
+}
+
+// Links a nameless file to a name like `wanted`, with the last letters chosen anew until nothing is there.
+bool give_name(int fd, std::string& wanted) {
+  const std::string source = "/proc/self/fd/" + std::to_string(fd);
+  const std::string stem = wanted.substr(0, wanted.rfind('.') + 1) + std::to_string(::getpid()) + "-";
+  for (int k = 0; k < 1000; ++k) {
+    wanted = stem + std::to_string(k);
+    if (::linkat(AT_FDCWD, source.c_str(), AT_FDCWD, wanted.c_str(), AT_SYMLINK_FOLLOW) == 0) return true;
+    if (errno != EEXIST) break;
+  }
+  wanted.clear();
+  return false;
+}
+
 }  // namespace
 
 std::string read_file(const std::filesystem::path& path, std::uintmax_t limit) {
@@ -64,7 +85,7 @@ std::string read_file(const std::filesystem::path& path, std::uintmax_t limit) {
   return bytes;
 }
 
-void write_file(const std::filesystem::path& asked, std::string_view bytes) {
+void write_file(const std::filesystem::path& asked, std::string_view bytes, Flush flush) {
   namespace fs = std::filesystem;
   const std::string name = asked.string();
   std::error_code error;
@@ -87,7 +108,11 @@ void write_file(const std::filesystem::path& asked, std::string_view bytes) {
 
   std::string temporary = (folder / ".").string();
   temporary.append(path.filename().string()).append(".XXXXXX");
-  Descriptor file{::mkstemp(temporary.data())};
+  // A file without a name until it is whole, so that not even a killed program leaves a part of one; where the file
+  // system has no such files, one with a name.
+  Descriptor file{nameless_file(folder)};
+  const bool nameless = file.fd >= 0;
+  if (!nameless) file.fd = ::mkstemp(temporary.data());
   if (file.fd < 0) throw OutputError(name + ": " + reason());
   auto fail = [&]() -> OutputError {
     const std::string why = reason();
@@ -105,12 +130,11 @@ void write_file(const std::filesystem::path& asked, std::string_view bytes) {
     ::umask(mask);
     mode = 0666 & ~mask;
   }
-  if (::fchmod(file.fd, mode) != 0 || ::fsync(file.fd) != 0) throw fail();
+  if (::fchmod(file.fd, mode) != 0 || (flush == Flush::yes && ::fsync(file.fd) != 0)) throw fail();
+  if (nameless && !give_name(file.fd, temporary)) throw fail();
   const int closed = ::close(file.fd);
   file.fd = -1;
   if (closed != 0 || ::rename(temporary.c_str(), path.c_str()) != 0) throw fail();
-  const Descriptor directory{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  if (directory.fd >= 0) ::fsync(directory.fd);  // the name, too; a file system that can't is no failure
 }
 
 }  // namespace toile

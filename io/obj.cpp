@@ -64,7 +64,7 @@ void ObjSink::write(const Frame& frame) {
                            " was due");
   const std::string digits = std::to_string(frame.number);
   const std::string name = "frame_" + std::string(digits.size() < 4 ? 4 - digits.size() : 0, '0') + digits + ".obj";
-  write_file(folder_ / name, format_obj(frame));
+  write_file(folder_ / name, format_obj(frame), Flush::no);
   ++next_;
 }
 

@@ -1,6 +1,9 @@
 #include "io/vtu.h"
 
+#include <zlib.h>
+
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <charconv>
@@ -53,34 +56,62 @@ struct Array {
 // One unstructured grid on its way into a file.
 struct Grid {
   std::vector<Eigen::Vector3d> points;
-  std::vector<std::int64_t> connectivity, offsets;
+  std::vector<std::int32_t> connectivity, offsets;
   std::vector<std::uint8_t> types;
   std::vector<Array<double>> point_reals, cell_reals;
+  std::vector<Array<float>> point_fields;
   std::vector<Array<std::int32_t>> point_integers, cell_integers;
   std::string point_attributes, cell_attributes;  // which array plays which part
 
   void close_cell(std::uint8_t type) {
-    offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
+    offsets.push_back(static_cast<std::int32_t>(connectivity.size()));
     types.push_back(type);
   }
   void add_point(const Eigen::Vector3d& x) { points.push_back(x); }
-  std::int64_t next_point() const { return static_cast<std::int64_t>(points.size()); }
+  std::int32_t next_point() const { return static_cast<std::int32_t>(points.size()); }
 };
 
-// XML head with offsets, and behind it the raw bytes: each array after its length as 64-bit integer.
+// Appends `bytes` as VTK wants compressed data: the number of blocks, the size of a block and of a last shorter one,
+// the compressed sizes, then a zlib stream a block. A block whose first bytes hardly shrink, such as most numbers that
+// were computed, is stored: deflating it would cost its time and save nothing.
+void append_compressed(std::string& to, std::string_view bytes) {
+  constexpr std::size_t block = std::size_t{1} << 16, probe = std::size_t{1} << 12;
+  const auto deflated = [](std::string_view part, int level) {
+    uLongf size = compressBound(part.size());
+    std::string out(size, '\0');
+    if (compress2(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(part.data()), part.size(),
+                  level) != Z_OK)
+      throw std::bad_alloc();  // the one reason left: the output fits and the level exists
+    out.resize(size);
+    return out;
+  };
+  std::vector<std::uint64_t> head{(bytes.size() + block - 1) / block, block, bytes.size() % block};
+  std::string body;
+  for (std::size_t first = 0; first < bytes.size(); first += block) {
+    const std::string_view part = bytes.substr(first, block), start = part.substr(0, probe);
+    const bool shrinks = deflated(start, Z_BEST_SPEED).size() < start.size() - start.size() / 8;
+    const std::string packed = deflated(part, shrinks ? Z_BEST_SPEED : Z_NO_COMPRESSION);
+    head.push_back(packed.size());
+    body += packed;
+  }
+  to.append(reinterpret_cast<const char*>(head.data()), head.size() * sizeof head[0]).append(body);
+}
+
+// XML head with offsets, and behind it the compressed arrays.
 class Writer {
  public:
   std::string finish(const Grid& grid, double time) {
     head_ =
         "<?xml version=\"1.0\"?>\n"
-        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" "
+        "compressor=\"vtkZLibDataCompressor\">\n"
         "<UnstructuredGrid>\n<FieldData>\n<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" "
         "format=\"ascii\">" +
         number(time) +
         "</DataArray>\n</FieldData>\n"
         "<Piece NumberOfPoints=\"" +
         std::to_string(grid.points.size()) + "\" NumberOfCells=\"" + std::to_string(grid.types.size()) + "\">\n";
-    section("PointData", grid.point_attributes, grid.point_reals, grid.point_integers);
+    section("PointData", grid.point_attributes, grid.point_fields, grid.point_reals, grid.point_integers);
     section("CellData", grid.cell_attributes, grid.cell_reals, grid.cell_integers);
     head_ += "<Points>\n";
     array("Points", 3, reinterpret_cast<const double*>(grid.points.data()), 3 * grid.points.size());
@@ -96,8 +127,8 @@ class Writer {
   template <class T>
   static const char* type_name() {
     if constexpr (std::is_same_v<T, double>) return "Float64";
+    if constexpr (std::is_same_v<T, float>) return "Float32";
     if constexpr (std::is_same_v<T, std::int32_t>) return "Int32";
-    if constexpr (std::is_same_v<T, std::int64_t>) return "Int64";
     if constexpr (std::is_same_v<T, std::uint8_t>) return "UInt8";
   }
 
@@ -105,25 +136,25 @@ class Writer {
   void array(const std::string& name, int components, const T* values, std::size_t count) {
     head_ += std::string("<DataArray type=\"") + type_name<T>() + "\" Name=\"" + name + "\" NumberOfComponents=\"" +
              std::to_string(components) + "\" format=\"appended\" offset=\"" + std::to_string(body_.size()) + "\"/>\n";
-    const std::uint64_t bytes = count * sizeof(T);
-    body_.append(reinterpret_cast<const char*>(&bytes), sizeof bytes);
-    if (bytes) body_.append(reinterpret_cast<const char*>(values), bytes);
+    append_compressed(body_, {reinterpret_cast<const char*>(values), count * sizeof(T)});
   }
 
-  void section(const std::string& name, const std::string& attributes, const std::vector<Array<double>>& reals,
-               const std::vector<Array<std::int32_t>>& integers) {
+  template <class... Arrays>
+  void section(const std::string& name, const std::string& attributes, const Arrays&... arrays) {
     head_ += '<' + name + attributes + ">\n";
-    for (const auto& a : reals) array(a.name, a.components, a.values.data(), a.values.size());
-    for (const auto& a : integers) array(a.name, a.components, a.values.data(), a.values.size());
+    const auto each = [this](const auto& list) {
+      for (const auto& a : list) array(a.name, a.components, a.values.data(), a.values.size());
+    };
+    (each(arrays), ...);
     head_ += "</" + name + ">\n";
   }
 
   std::string head_, body_;
 };
 
-template <class Vector>
-void append(std::vector<double>& to, const Vector& x) {
-  to.insert(to.end(), x.data(), x.data() + x.size());
+template <class T, class Vector>
+void append(std::vector<T>& to, const Vector& x) {
+  for (const double value : x) to.push_back(static_cast<T>(value));
 }
 
 // The order in which VTK wants the control points of a quadrilateral: corners, edges v = 0, u = 1, v = 1, u = 0 (each
@@ -149,7 +180,8 @@ bool all_panels_have_velocity(const Frame& frame) {
 Grid surface_block(const Frame& frame) {
   Grid grid;
   const bool moving = all_panels_have_velocity(frame);
-  Array<double> weights{"RationalWeights", 1, {}}, velocity{"velocity", 3, {}}, degrees{"HigherOrderDegrees", 3, {}};
+  Array<double> weights{"RationalWeights", 1, {}}, degrees{"HigherOrderDegrees", 3, {}};
+  Array<float> velocity{"velocity", 3, {}};
   Array<std::int32_t> panel_number{"panel", 1, {}};
   for (std::size_t k = 0; k < frame.panels.size(); ++k) {
     const FramePanel& panel = frame.panels[k];
@@ -175,7 +207,7 @@ Grid surface_block(const Frame& frame) {
   grid.point_attributes = " RationalWeights=\"RationalWeights\"";
   grid.cell_attributes = " HigherOrderDegrees=\"HigherOrderDegrees\"";
   grid.point_reals.push_back(std::move(weights));
-  if (moving) grid.point_reals.push_back(std::move(velocity));
+  if (moving) grid.point_fields.push_back(std::move(velocity));
   grid.cell_reals.push_back(std::move(degrees));
   grid.cell_integers.push_back(std::move(panel_number));
   return grid;
@@ -188,23 +220,24 @@ void add_field(Grid& grid, const Frame& frame, std::vector<Eigen::Matrix<double,
   for (const FramePanel& panel : frame.panels)
     if ((panel.fields.*field).size() != panel.triangles->uv.size()) return;
   for (int c = 0; c < N; ++c) {
-    Array<double> out{names[static_cast<std::size_t>(c)], 1, {}};
+    Array<float> out{names[static_cast<std::size_t>(c)], 1, {}};
     for (const FramePanel& panel : frame.panels)
-      for (const auto& value : panel.fields.*field) out.values.push_back(value[c]);
-    grid.point_reals.push_back(std::move(out));
+      for (const auto& value : panel.fields.*field) out.values.push_back(static_cast<float>(value[c]));
+    grid.point_fields.push_back(std::move(out));
   }
 }
 
 Grid triangle_block(const Frame& frame) {
   Grid grid;
   const bool moving = all_panels_have_velocity(frame);
-  Array<double> normal{"normal", 3, {}}, uv{"uv", 2, {}}, velocity{"velocity", 3, {}};
+  Array<float> normal{"normal", 3, {}}, velocity{"velocity", 3, {}};
+  Array<double> uv{"uv", 2, {}};
   Array<std::int32_t> panel_number{"panel", 1, {}};
   SurfaceBasis basis;
   for (std::size_t k = 0; k < frame.panels.size(); ++k) {
     const FramePanel& panel = frame.panels[k];
     const NurbsSurface& surface = *panel.surface;
-    const std::int64_t first = grid.next_point();
+    const std::int32_t first = grid.next_point();
     for (const Eigen::Vector2d& p : panel.triangles->uv) {
       evaluate_basis(surface, p[0], p[1], basis);
       Eigen::Vector3d x = Eigen::Vector3d::Zero(), xu = x, xv = x, xt = x;
@@ -234,9 +267,9 @@ Grid triangle_block(const Frame& frame) {
   add_field<3>(grid, frame, &FrameFields::second_pk, {"second_pk_weft", "second_pk_warp", "second_pk_shear"});
   add_field<2>(grid, frame, &FrameFields::nominal, {"nominal_stress_weft", "nominal_stress_warp"});
   add_field<3>(grid, frame, &FrameFields::curvature, {"curvature_weft", "curvature_warp", "curvature_twist"});
-  grid.point_reals.push_back(std::move(normal));
+  grid.point_fields.push_back(std::move(normal));
+  if (moving) grid.point_fields.push_back(std::move(velocity));
   grid.point_reals.push_back(std::move(uv));
-  if (moving) grid.point_reals.push_back(std::move(velocity));
   grid.cell_integers.push_back(std::move(panel_number));
   return grid;
 }
@@ -248,7 +281,7 @@ Grid net_block(const Frame& frame) {
   for (std::size_t k = 0; k < frame.panels.size(); ++k) {
     const FramePanel& panel = frame.panels[k];
     const NurbsSurface& surface = *panel.surface;
-    const std::int64_t first = grid.next_point();
+    const std::int32_t first = grid.next_point();
     const auto line = [&](int a, int b) {
       grid.connectivity.insert(grid.connectivity.end(), {first + a, first + b});
       grid.close_cell(vtk_line);
@@ -297,7 +330,8 @@ Grid trim_block(const Frame& frame) {
 
 Grid point_block(const Frame& frame) {
   Grid grid;
-  Array<double> uv{"uv", 2, {}}, t{"t", 1, {}}, weft{"strain_weft", 1, {}}, warp{"strain_warp", 1, {}};
+  Array<double> uv{"uv", 2, {}}, t{"t", 1, {}};
+  Array<float> weft{"strain_weft", 1, {}}, warp{"strain_warp", 1, {}};
   Array<std::int32_t> kind{"kind", 1, {}}, used{"used", 1, {}}, loop{"loop", 1, {}}, curve{"curve", 1, {}},
       panel_number{"panel", 1, {}};
   bool strained = true;
@@ -317,12 +351,12 @@ Grid point_block(const Frame& frame) {
       curve.values.push_back(point.curve);
       panel_number.values.push_back(static_cast<std::int32_t>(k));
       if (strained) {
-        weft.values.push_back(panel.point_strain[i][0]);
-        warp.values.push_back(panel.point_strain[i][1]);
+        weft.values.push_back(static_cast<float>(panel.point_strain[i][0]));
+        warp.values.push_back(static_cast<float>(panel.point_strain[i][1]));
       }
     }
   }
-  if (strained) grid.point_reals = {std::move(weft), std::move(warp)};
+  if (strained) grid.point_fields = {std::move(weft), std::move(warp)};
   grid.point_reals.push_back(std::move(uv));
   grid.point_reals.push_back(std::move(t));
   grid.point_integers = {std::move(kind), std::move(used), std::move(loop), std::move(curve), std::move(panel_number)};
@@ -362,21 +396,23 @@ void VtuSink::write(const Frame& frame) {
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<vtkMultiBlockDataSet>\n";
   for (std::size_t k = 0; k < parts.size(); ++k) {
     const std::string part = parts[k].first;
-    write_file(folder_ / stem / (part + ".vtu"), *parts[k].second);
+    write_file(folder_ / stem / (part + ".vtu"), *parts[k].second, Flush::no);
     index += "<DataSet index=\"" + std::to_string(k) + "\" name=\"" + part + "\" file=\"" + escaped(stem) + '/' + part +
              ".vtu\"/>\n";
   }
-  write_file(folder_ / (stem + ".vtm"), index + "</vtkMultiBlockDataSet>\n</VTKFile>\n");
+  write_file(folder_ / (stem + ".vtm"), index + "</vtkMultiBlockDataSet>\n</VTKFile>\n", Flush::no);
 
   std::vector<double> times = times_;
   times.push_back(frame.time);
   std::string collection =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<Collection>\n";
-  for (std::size_t k = 0; k < times.size(); ++k)
-    collection += "<DataSet timestep=\"" + number(times[k]) + "\" part=\"0\" file=\"" + escaped(name_) + '_' +
-                  four_digits(static_cast<int>(k)) + ".vtm\"/>\n";
-  write_file(folder_ / (name_ + ".pvd"), collection + "</Collection>\n</VTKFile>\n");
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    const std::string file = name_ + '_' + four_digits(static_cast<int>(k)) + ".vtm";
+    if (!std::filesystem::exists(folder_ / file)) continue;
+    collection += "<DataSet timestep=\"" + number(times[k]) + "\" part=\"0\" file=\"" + escaped(file) + "\"/>\n";
+  }
+  write_file(folder_ / (name_ + ".pvd"), collection + "</Collection>\n</VTKFile>\n", Flush::no);
   times_ = std::move(times);
 }
 

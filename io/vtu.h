@@ -9,8 +9,9 @@
 
 namespace toile {
 
-// The five blocks of a frame, each a VTK XML unstructured grid (raw appended doubles, little endian).
-//   surface:   one quadrilateral of type 77 per Bezier patch of each panel, the whole untrimmed net; velocity is exact
+// The five blocks of a frame, each a VTK XML unstructured grid (appended, zlib, little endian). Positions, weights and
+// parameters are doubles; strain, stress, curvature, normals and velocities have single precision.
+//   surface:   one quadrilateral of type 77 per Bezier patch of each panel, the whole untrimmed net; velocity
 //   triangles: the material; fields of FrameFields, uv, velocity, panel
 //   net:       control polygons as lines; carries_cloth, weight, and (i, j) of each control point
 //   trims:     every trim curve as a polyline; panel, loop and curve numbers of the file
@@ -22,7 +23,8 @@ struct VtuBlocks {
 VtuBlocks format_vtu(const Frame& frame);
 
 // Writes FOLDER/NAME_0000.vtm, its blocks in FOLDER/NAME_0000/, and FOLDER/NAME.pvd, which names all frames with their
-// times and is replaced after each frame. `written`: times of frames that a resumed run already has on disk.
+// times and is replaced after each frame. `written`: times of frames that a resumed run has made before; those that are
+// not in FOLDER stay out of the index.
 class VtuSink : public FrameSink {
  public:
   VtuSink(std::filesystem::path folder, std::string name, std::vector<double> written = {});

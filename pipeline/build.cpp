@@ -53,10 +53,6 @@ const TrimmedSurface& select_face(const PanelFile& file, const ScenePanel& panel
   return file.panels[static_cast<std::size_t>(panel.order)];
 }
 
-double box_size(const NurbsSurface& surface) {
-  return bounding_box(surface).diagonal().norm();
-}
-
 NurbsSurface placed(const NurbsSurface& surface, double metres_per_unit, const Placement& place) {
   Eigen::Matrix3Xd points = place.rotation() * (metres_per_unit * surface.points());
   points.colwise() += place.translate;
@@ -97,7 +93,7 @@ NurbsSurface refined(const TrimmedSurface& source, const ScenePanel& panel, cons
     if (panel.span) options.span = *panel.span / source.metres_per_unit;
     options.spans = panel.spans;
     options.control_points = panel.control_points;
-    options.tolerance = std::max(source.resolution, 1e-9 * box_size(surface));
+    options.tolerance = same_place(source.resolution, surface);
     Refinement refinement;
     try {
       refinement = refine(surface, options);
@@ -108,6 +104,73 @@ NurbsSurface refined(const TrimmedSurface& source, const ScenePanel& panel, cons
   }
   refuse_tears(surface, who);
   return surface;
+}
+
+char letter(Direction d) {
+  return d == Direction::u ? 'u' : 'v';
+}
+
+// Glues the seams of a closed surface where cloth lies on both of their sides. A seam that is trimmed apart all along
+// is no seam of the cloth.
+void close_seams(BuiltPanel& built, const std::string& who, std::vector<std::string>& warnings) {
+  NurbsSurface& surface = built.face.surface;
+  const double tolerance = same_place(built.source.resolution, surface);
+  const Closure ends = find_closure(surface, tolerance);
+  for (const KinkPoint& point : kink_points(built.face, built.topology, ends)) {
+    if (point.at != surface.knots(point.direction).domain().min) continue;
+    (point.direction == Direction::u ? built.closure.u : built.closure.v) = true;
+  }
+  surface = close_exactly(surface, built.closure);
+  built.leader = seam_leaders(surface, built.closure);
+  for (const Direction d : {Direction::u, Direction::v}) {
+    if (!ends_meet(surface, d, tolerance)) continue;
+    const Interval domain = surface.knots(d).domain();
+    const char* what = built.closure.in(d) ? "meet and are glued: the panel is closed there"
+                       : ends.in(d)        ? "meet, but the trims part the cloth there: it stays open"
+                                           : "have the same control points, but other weights: they stay apart";
+    warnings.push_back(
+        fmt::format("{}: the edges {} = {} and {} = {} {}", who, letter(d), domain.min, letter(d), domain.max, what));
+  }
+}
+
+// Does the material touch the edge of the domain along more than a point?
+bool cloth_on_edge(const TrimTopology& topology, Direction d, int end) {
+  const KnotMesh& mesh = topology.mesh;
+  const bool is_u = d == Direction::u;
+  const int cells = is_u ? mesh.cells_u() : mesh.cells_v(), along = is_u ? mesh.cells_v() : mesh.cells_u();
+  const int line = end == 0 ? 0 : cells - 1;
+  for (int k = 0; k < along; ++k) {
+    const int cell = is_u ? mesh.cell(line, k) : mesh.cell(k, line);
+    if (topology.cells[static_cast<std::size_t>(cell)] == CellKind::inside) return true;
+  }
+  const double edge = end == 0 ? (is_u ? mesh.u : mesh.v).front() : (is_u ? mesh.u : mesh.v).back();
+  const int axis = is_u ? 0 : 1;
+  for (const CutCell& cell : topology.cut_cells) {
+    if ((is_u ? cell.i : cell.j) != line) continue;
+    for (const std::vector<BoundaryPiece>& loop : cell.loops) {
+      for (const BoundaryPiece& piece : loop) {
+        if (piece.from[axis] == edge && piece.to[axis] == edge) return true;
+      }
+    }
+  }
+  return false;
+}
+
+// At a pole weft and warp have no direction.
+void refuse_poles(const BuiltPanel& built, const std::string& who) {
+  const NurbsSurface& surface = built.face.surface;
+  for (const Direction d : {Direction::u, Direction::v}) {
+    for (const int end : {0, 1}) {
+      if (!collapsed(surface, d, end, same_place(built.source.resolution, surface)) ||
+          !cloth_on_edge(built.topology, d, end))
+        continue;
+      const Interval domain = surface.knots(d).domain();
+      throw GeometryError(
+          fmt::format("{}: the edge {} = {} is one point, at which weft and warp have no direction; trim the cloth "
+                      "around it away or draft the panel without a pole",
+                      who, letter(d), end == 0 ? domain.min : domain.max));
+    }
+  }
 }
 
 // Row sums of the mass matrix of a panel, SI.
@@ -168,20 +231,41 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
     warnings.push_back(fmt::format("{}: loop {}: {}", who, repair.loop, repair.what));
   }
   built.topology = trace_trims(built.face);
+  close_seams(built, who, warnings);
+  refuse_poles(built, who);
   CutQuadrature rule = quadrature(built.face, built.topology);
   if (!(rule.area > 0)) throw GeometryError(who + ": the trim leaves no material");
   built.points = constraint_points(built.face, built.topology);
-  built.extra_points = points_for_degree(built.face, built.topology);
+  built.extra_points = points_for_degree(built.face, built.topology, PointRule::border, built.closure);
+  for (auto* points : {&built.points, &built.extra_points}) {
+    merge_over_seams(built.face.surface, built.closure, *points);
+  }
 
   const NurbsSurface rest = placed(built.face.surface, unit, panel.place);
-  Extension extension = extend(rest, rule, row_sums(rest, rule, panel.fabric.density));
+  Extension extension = extend(rest, rule, row_sums(rest, rule, panel.fabric.density), {}, built.leader);
   built.carries_cloth = extension.carries_cloth;
   built.extended = extension.extended;
   built.extension_deviation = extension.deviation;
   parts.dependence = std::move(extension.dependence);
+  std::vector<KinkPoint> kinks = kink_points(built.face, built.topology, built.closure);
+  built.smooth_seams = tie_smooth_seams(
+      extension.rest, built.closure, unit * same_place(built.source.resolution, built.face.surface), parts.dependence);
+  if (built.smooth_seams.any()) {
+    extension.rest = extension.rest.with_points(extension.rest.points() * parts.dependence.transpose());
+    drop_strips(built.face.surface, built.smooth_seams, kinks);
+    drop_extra_points(built.face.surface, built.smooth_seams, built.extra_points);
+  }
   parts.start = extension.rest.points();
   if (panel.start) {
     NurbsSurface start = start_surface(file, panel, built.face.surface);
+    for (std::size_t k = 0; k < built.leader.size(); ++k) {
+      const Eigen::Vector3d gap =
+          start.points().col(static_cast<Eigen::Index>(k)) - start.points().col(built.leader[k]);
+      if (!(gap.norm() <= same_place(built.source.resolution, start))) {
+        throw InputError(fmt::format("{}: start: '{}' is open where '{}' is closed at its seam", panel.where,
+                                     *panel.start, panel.name));
+      }
+    }
     parts.start = placed(start, unit, panel.place).points();
   }
   parts.shell = {panel.name,
@@ -189,11 +273,16 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
                  std::move(rule),
                  panel.fabric,
                  panel.grain.value_or(grain_angle(built.source).value_or(0)),
-                 kink_points(built.face, built.topology)};
+                 mean_u_direction(rest),
+                 std::move(kinks)};
   return parts;
 }
 
 }  // namespace
+
+double same_place(double resolution, const NurbsSurface& surface) {
+  return std::max(resolution, 1e-9 * bounding_box(surface).diagonal().norm());
+}
 
 int Build::panel(const std::string& name) const {
   for (std::size_t k = 0; k < panels.size(); ++k) {

@@ -9,6 +9,8 @@
 #include "analysis/affine_map.h"
 #include "analysis/dynamics/verlet.h"
 #include "analysis/shell/shell_model.h"
+#include "analysis/smooth_seam.h"
+#include "geometry/closure.h"
 #include "geometry/trimmed_surface.h"
 #include "io/iges.h"
 #include "pipeline/scene.h"
@@ -28,6 +30,9 @@ struct BuiltPanel {
   std::vector<ConstraintPoint> points;        // the listed ones
   std::vector<ConstraintPoint> extra_points;  // at degree 3 and above: of the projection only
   std::vector<LoopRepair> repairs;
+  Closure closure;                  // directions in which the surface closes on itself: glued at its seam
+  std::vector<int> leader;          // per control point: the one that stands for it, see seam_leaders()
+  SmoothSeams smooth_seams;         // where the seam's control points follow those beside it
   std::vector<bool> carries_cloth;  // per control point
   std::vector<int> extended;        // control points with too little cloth that follow their neighbours
   double extension_deviation = 0;   // m, of the rest surface inside the material
@@ -59,6 +64,9 @@ struct Build {
   // A panel's net out of the control points of all panels [m].
   Eigen::Matrix3Xd net(int panel, const Eigen::VectorXd& q) const;
 };
+
+// Length below which two places of a file are one: what the file says, at least 1e-9 of the surface's size.
+double same_place(double resolution, const NurbsSurface& surface);
 
 // Throws InputError (files, names), GeometryError (panel, loop, place; pin or traction on a trimmed-away place).
 Build build(Scene scene);

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <new>
@@ -20,6 +21,7 @@
 #include "io/file.h"
 #include "io/iges.h"
 #include "io/panel_file.h"
+#include "pipeline/allocation_count.h"
 #include "pipeline/console.h"
 #include "pipeline/convert.h"
 #include "pipeline/drape.h"
@@ -27,6 +29,7 @@
 #include "pipeline/json_text.h"
 #include "pipeline/pattern_scene.h"
 #include "pipeline/scene.h"
+#include "pipeline/study.h"
 #include "pipeline/templates.h"
 #include "pipeline/units.h"
 #include "pipeline/version.h"
@@ -52,13 +55,15 @@ void add_common(CLI::App& app, Common& common) {
   app.add_flag("--no-progress", common.no_progress, "No progress line");
   app.add_flag("--overwrite", common.overwrite, "Replace files of a former run");
   app.add_option("--color", common.colour, "auto or never")->check(CLI::IsMember({"auto", "never"}));
-  app.add_option("--threads", common.threads, "Threads; this version uses one")->check(CLI::Range(1, 1));
+  app.add_option("--threads", common.threads, "Threads of a drape; any number gives the same bytes")
+      ->check(CLI::Range(1, 64));
 }
 
 struct DrapeArguments {
   std::string input, directory;
   std::vector<std::string> settings, pins;
-  std::string until, fabric, span;
+  std::string until, fabric, span, time_limit;
+  std::optional<std::string> resume;
   int degree = 0;
   bool dry = false;
 };
@@ -90,6 +95,7 @@ Scene scene_of(const DrapeArguments& a) {
     if (s.find('=') == std::string::npos) throw UsageError(fmt::format("--set {}: expected key=value", s));
   }
   if (!a.until.empty()) settings.push_back("solver.until=" + a.until);
+  if (!a.time_limit.empty()) settings.push_back("solver.time_limit=" + a.time_limit);
   const bool scene_file = std::filesystem::path(a.input).extension() == ".toml";
   if (scene_file) {
     if (!a.pins.empty() || !a.fabric.empty() || !a.span.empty() || a.degree > 0) {
@@ -127,6 +133,10 @@ int run_drape(const DrapeArguments& a, const Common& common, Console& console) {
   if (!a.directory.empty()) options.directory = a.directory;
   options.overwrite = common.overwrite;
   options.json = common.json;
+  std::signal(SIGPIPE, SIG_IGN);  // a reader of the messages that goes away doesn't end the run
+  options.threads = common.threads;
+  if (allocation_count()) options.allocations = [] { return *allocation_count(); };
+  if (a.resume) options.resume = *a.resume;
   return drape(std::move(scene), options, console);
 }
 
@@ -175,12 +185,16 @@ int run_inspect(const InspectArguments& a, const Common& common, Console& consol
   } else {
     fmt::print("{}", inspect_text(inspection, common.verbose));
   }
-  return exit_ok;
+  for (const std::string& panel : inspection.refused) console.error(panel);
+  return inspection.refused.empty() ? exit_ok : exit_geometry;
 }
 
 int run_roundtrip(const std::string& input, bool rewrite, const Common& common) {
-  const RoundtripReport r = roundtrip(read_panels(input), rewrite ? IgesMode::rewrite : IgesMode::replay);
+  const PanelFile file = read_panels(input);
+  const RoundtripReport r = roundtrip(file, rewrite ? IgesMode::rewrite : IgesMode::replay);
   if (common.json) {
+    nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
+    for (const std::string& warning : file.warnings) warnings.push_back(utf8(warning));
     const nlohmann::ordered_json out = {{"file", input},
                                         {"mode", rewrite ? "rewrite" : "replay"},
                                         {"exact", r.exact()},
@@ -192,7 +206,9 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
                                         {"weights_equal", r.weights_equal},
                                         {"points_equal", r.points_equal},
                                         {"parameter_curves_equal", r.parameter_curves_equal},
-                                        {"differences", r.differences}};
+                                        {"differences", r.differences},
+                                        {"warnings", warnings},
+                                        {"ledger", ledger_json(file.ledger)}};
     fmt::print("{}\n", json_text(out));
   } else {
     fmt::print(
@@ -201,6 +217,8 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
         r.knots_equal ? "equal" : "DIFFER", r.weights_equal ? "equal" : "DIFFER", r.points_equal ? "equal" : "DIFFER",
         r.parameter_curves_equal ? "equal" : "DIFFER");
     for (const std::string& difference : r.differences) fmt::print("  {}\n", difference);
+    fmt::print("{}", ledger_text(file.ledger));
+    for (const std::string& warning : file.warnings) fmt::print("  warning     {}\n", warning);
   }
   return r.exact() ? exit_ok : exit_check;
 }
@@ -223,6 +241,17 @@ int run_init_pattern(const InitArguments& a, const Common& common, Console& cons
   for (const std::string& note : scene.notes) console.note(note);
   console.note(fmt::format("wrote {0}; now: toile check {0}", target.string()));
   return exit_ok;
+}
+
+int run_study_file(const std::string& input, const std::string& directory, const Common& common, Console& console) {
+  StudyOptions options;
+  // Each run is this very program.
+  options.program = std::filesystem::read_symlink("/proc/self/exe");
+  if (!directory.empty()) options.directory = directory;
+  options.overwrite = common.overwrite;
+  options.json = common.json;
+  options.threads = common.threads;
+  return run_study(read_study(input), options, console);
 }
 
 int run_init(const std::string& name, const std::string& directory, const Common& common, Console& console) {
@@ -292,7 +321,12 @@ int run_command(int argc, char** argv) {
       ->take_all()
       ->allow_extra_args(false);
   drape_command->add_option("--until", drape_arguments.until, "Simulated time, s or with a unit");
-  drape_command->add_flag("--dry-run", drape_arguments.dry, "Say step, time and memory; run nothing");
+  auto* dry = drape_command->add_flag("--dry-run", drape_arguments.dry, "Say step, time and memory; run nothing");
+  drape_command
+      ->add_option("--resume", drape_arguments.resume, "Go on from a checkpoint of the same scene (DIR/checkpoint)")
+      ->excludes(dry);
+  drape_command->add_option("--time-limit", drape_arguments.time_limit,
+                            "Wall time after which the run stops and leaves a checkpoint, s or with a unit");
   drape_command->add_option("--pin", drape_arguments.pins, "Panel files: what is held, such as curve:0,2; may repeat")
       ->take_all()
       ->allow_extra_args(false);
@@ -328,6 +362,12 @@ int run_command(int argc, char** argv) {
   check_command->add_option("SCENE", check_arguments.input)->required();
   check_command->add_option("--set", check_arguments.settings, "key.path=value")->take_all()->allow_extra_args(false);
 
+  std::string study_input, study_directory;
+  CLI::App* study_command =
+      app.add_subcommand("study", "Run a scene many times: errors against time, stability tables");
+  study_command->add_option("STUDY", study_input, "study.toml")->required();
+  study_command->add_option("-o,--output", study_directory, "Directory of the results (default: out/<study name>)");
+
   InitArguments init_arguments;
   CLI::App* init_command = app.add_subcommand("init", "Write a scene to start from; without a name, list them");
   init_command->add_option("TEMPLATE", init_arguments.name);
@@ -341,7 +381,7 @@ int run_command(int argc, char** argv) {
   CLI::App* presets_command = app.add_subcommand("presets", "Fabrics that need no table in the scene");
 
   for (CLI::App* command : {drape_command, inspect_command, convert_command, roundtrip_command, check_command,
-                            init_command, presets_command}) {
+                             study_command, init_command, presets_command}) {
     add_common(*command, common);
   }
 
@@ -366,6 +406,7 @@ int run_command(int argc, char** argv) {
         throw UsageError("check takes a scene.toml");
       return check_scene(scene_of(check_arguments), common.json, console);
     }
+    if (*study_command) return run_study_file(study_input, study_directory, common, console);
     if (*init_command && !init_arguments.pattern.empty()) return run_init_pattern(init_arguments, common, console);
     if (*init_command) return run_init(init_arguments.name, init_arguments.output, common, console);
     if (*presets_command) return run_presets(common);
@@ -404,6 +445,7 @@ int run_command(int argc, char** argv) {
 
 int run_program(int argc, char** argv) {
   keep_standard_streams();
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of a file's size fails, and is reported, as on a full disk
   const int code = run_command(argc, argv);
   errno = 0;
   if ((std::fflush(stdout) == 0 && std::ferror(stdout) == 0) || code != exit_ok) return code;

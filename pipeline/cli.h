@@ -11,6 +11,7 @@ enum ExitCode : int {
   exit_geometry = 4,
   exit_solver = 5,
   exit_check = 6,
+  exit_time_limit = 7,
   exit_output = 8,
   exit_interrupted = 130,
 };

@@ -13,6 +13,7 @@
 #include "geometry/error.h"
 #include "io/file.h"
 #include "pipeline/build.h"
+#include "pipeline/checkpoint.h"
 #include "pipeline/cli.h"
 #include "pipeline/json_text.h"
 #include "pipeline/output.h"
@@ -27,23 +28,32 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+// Of wall time between checkpoints; the promise is two seconds.
+constexpr double checkpoint_seconds = 1;
+
 volatile std::sig_atomic_t interrupted = 0;
 void on_interrupt(int) {
   interrupted = 1;
-  std::signal(SIGINT, SIG_DFL);
 }
 
-// SIGINT asks the run to finish while this lives; a second one ends the program at once.
+// SIGINT and SIGTERM ask the run to finish while this lives; a second one of the same kind ends the program at once.
 class InterruptGuard {
  public:
   InterruptGuard() {
     interrupted = 0;
-    previous_ = std::signal(SIGINT, on_interrupt);
+    struct sigaction action = {};
+    action.sa_handler = on_interrupt;
+    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+    ::sigaction(SIGINT, &action, &interrupt_);
+    ::sigaction(SIGTERM, &action, &terminate_);
   }
-  ~InterruptGuard() { std::signal(SIGINT, previous_); }
+  ~InterruptGuard() {
+    ::sigaction(SIGINT, &interrupt_, nullptr);
+    ::sigaction(SIGTERM, &terminate_, nullptr);
+  }
 
  private:
-  void (*previous_)(int) = nullptr;
+  struct sigaction interrupt_ = {}, terminate_ = {};
 };
 
 int exit_code(RunExit exit) {
@@ -56,6 +66,8 @@ int exit_code(RunExit exit) {
       return exit_check;
     case RunExit::interrupted:
       return exit_interrupted;
+    case RunExit::time_limit:
+      return exit_time_limit;
   }
   return exit_internal;
 }
@@ -103,44 +115,85 @@ void refuse_not_simulated(const Scene& scene) {
   if (!reasons.empty()) throw InputError(fmt::format("{}", fmt::join(reasons, "\n")));
 }
 
+// "42 s", "3 min", "2.5 h".
+std::string duration(double seconds) {
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+bool holds(const std::filesystem::path& directory, const std::filesystem::path& file) {
+  std::error_code error;
+  return std::filesystem::equivalent(directory, std::filesystem::absolute(file).parent_path(), error);
+}
+
 }  // namespace
 
 int drape(Scene scene, const DrapeOptions& options, Console& console) {
+  const Clock::time_point called = Clock::now();
   refuse_not_simulated(scene);
   const std::filesystem::path directory = options.directory.value_or(std::filesystem::path("out") / scene.name);
   const Build built = build(std::move(scene));
+  built.model->use_threads(options.threads);
   for (const std::string& warning : built.warnings) console.warning(warning);
   for (std::size_t k = 0; k < built.panels.size(); ++k) console.detail(describe(built, k));
   // What can be refused is refused before anything is written.
-  assemble(built, 0);
-  prepare_directory(directory, options.overwrite);
+  RunResult result;
+  if (options.resume) {
+    result = read_checkpoint(*options.resume, built);
+    require_time_left(built, result);
+  } else {
+    assemble(built, 0);
+  }
+  const bool goes_on = options.resume && holds(directory, *options.resume);
+  if (!goes_on) prepare_directory(directory, options.overwrite);
 
-  std::ofstream log(directory / "run.log");
+  std::ofstream log(directory / "run.log", goes_on ? std::ios::app : std::ios::trunc);
   log << "toile " << version() << "\nscene " << built.scene.path.string() << "\n";
+  if (options.resume) log << fmt::format("resumed from {} at t = {:.6f} s\n", options.resume->string(), result.state.t);
   for (std::size_t k = 0; k < built.panels.size(); ++k) log << describe(built, k) << "\n";
   const bool twist_free =
       std::ranges::all_of(built.scene.panels, [](const ScenePanel& p) { return p.fabric.bending.twist == 0; });
   if (twist_free) log << "twist stiffness is 0, as in the paper's bending law\n";
   for (const std::string& warning : built.warnings) log << "warning: " << warning << "\n";
 
-  FrameWriter writer(built, directory);
+  FrameWriter writer(built, directory, result.frame_times);
+  const SceneMark mark = scene_mark(built);
   const Clock::time_point start = Clock::now();
+  Clock::time_point saved = start;
+  const double start_time = result.state.t;
+  const auto save = [&](const RunState& state, const System& system) {
+    write_file(directory / "checkpoint", format_checkpoint(mark, state, system));
+    saved = Clock::now();
+  };
   const InterruptGuard guard;
   RunHooks hooks;
-  hooks.stop = [] { return interrupted != 0; };
+  hooks.allocations = options.allocations;
+  hooks.stop = [&] {
+    if (interrupted != 0) return RunExit::interrupted;
+    const auto& limit = built.scene.time_limit;
+    return limit && since(called) >= *limit ? RunExit::time_limit : RunExit::ok;
+  };
+  hooks.resumable = [&](const RunResult& now) {
+    if (now.steps == 0 || since(saved) >= checkpoint_seconds) save(now, *now.system);
+  };
   hooks.frame = [&](const RunFrame& frame) {
     writer.write(frame);
     log << fmt::format("frame {:4}  t = {:.6f} s  {:.2f} s of wall time\n", frame.number, frame.time, since(start))
         << std::flush;
   };
   hooks.progress = [&](const RunProgress& p) {
-    const double wall = since(start);
-    console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {:.0f} s left",
-                             100 * p.time / p.until, p.time, p.until, p.steps, p.dt,
-                             p.time > 0 ? wall * (p.until - p.time) / p.time : 0.0));
+    const double gone = p.time - start_time;
+    console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {} left", 100 * p.time / p.until,
+                             p.time, p.until, p.steps, p.dt, duration(since(start) * (p.until - p.time) / gone)));
   };
-  RunResult result = run(built, hooks);
+  result = result.system ? run(built, std::move(result), hooks) : run(built, hooks);
   console.end_live();
+  if (result.accepted) {
+    save(*result.accepted, *result.system);
+  } else {
+    save(result, *result.system);
+  }
 
   const Clock::time_point writing = Clock::now();
   const Eigen::VectorXd q = control_points(*result.system, result.state);
@@ -167,6 +220,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit),
                      result.steps, result.redone_steps, result.dt_min, result.dt_max, result.wall_seconds);
   if (!result.reason.empty()) log << result.reason << "\n";
+  if (!log.flush()) throw OutputError((directory / "run.log").string() + ": not everything could be written");
 
   console.note(fmt::format("{}: {:.3g} s in {} frames, {} steps of {:.2g} to {:.2g} s, {:.2f} s of wall time",
                            built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 
 #include "pipeline/console.h"
@@ -12,11 +13,16 @@ namespace toile {
 struct DrapeOptions {
   std::optional<std::filesystem::path> directory;  // unset: out/<scene name>
   bool overwrite = false;
-  bool json = false;  // the report on stdout
+  bool json = false;                            // the report on stdout
+  int threads = 1;                              // of forces and tangents; any number gives the same bytes
+  std::function<long()> allocations;            // of the program so far, for the report; unset: not counted
+  std::optional<std::filesystem::path> resume;  // a checkpoint to go on from
 };
 
-// Runs a scene and writes its files; a scene that can't be built leaves none. Returns the exit code. SIGINT ends the
-// run after the present step with all files whole.
+// Runs a scene and writes its files; a scene that can't be built, and a checkpoint that doesn't fit, leave none.
+// Returns the exit code. DIR/checkpoint is replaced every second and at the end. SIGINT, SIGTERM and the scene's time
+// limit (of wall time since the call) end the run after the present step, with the files of its last state. A run that
+// resumes in the checkpoint's own folder goes on with the frames there.
 int drape(Scene scene, const DrapeOptions& options, Console& console);
 
 // Builds the scene and says what a run would be: step and the cell that limits it, steps, estimated time and memory,

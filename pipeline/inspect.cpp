@@ -9,6 +9,7 @@
 #include <set>
 
 #include "analysis/extension.h"
+#include "analysis/projection/point_rule.h"
 #include "analysis/projection/select_rows.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
@@ -51,37 +52,29 @@ int active_control_points(const NurbsSurface& surface, const TrimTopology& topol
   return static_cast<int>(std::ranges::count(active, true));
 }
 
-// Which points the projection takes, with the default fabric and nothing pinned.
-void decide_used(InspectedPanel& panel) {
-  const TrimmedSurface& face = panel.face;
-  const NurbsSurface rest = face.surface.with_points(face.metres_per_unit * face.surface.points());
-  ShellPanel shell{face.name, rest, quadrature(face, panel.topology), Fabric{}, 0};
-  const Eigen::VectorXd row_sums = ShellModel({shell}).lumped_mass();
-  Extension extension = extend(rest, shell.quadrature, row_sums);
-  shell.rest = std::move(extension.rest);
-  const ShellModel model({shell});
-  const AffineMap map(extension.dependence, {}, {});
-  const Eigen::VectorXd floor = mass_floor(shell.rest, shell.fabric.density);
-  Eigen::VectorXd mass = map.reduce_scalar(model.lumped_mass());
-  for (Eigen::Index k = 0; k < mass.size(); ++k) {
-    mass[k] = std::max(mass[k], floor[map.node_control_point()[static_cast<std::size_t>(k)]]);
+// One line for each loop and kind of repair ("snapped ...", "closed ..."): the largest of them, with its move.
+std::vector<std::string> repair_warnings(const std::vector<LoopRepair>& repairs) {
+  struct Group {
+    const LoopRepair* largest;
+    int count = 0;
+  };
+  std::vector<std::pair<std::string, Group>> groups;
+  for (const LoopRepair& repair : repairs) {
+    const std::string key = fmt::format("{} {}", repair.loop, repair.what.substr(0, repair.what.find(' ')));
+    auto group = std::ranges::find(groups, key, [](const auto& g) { return g.first; });
+    if (group == groups.end()) group = groups.insert(groups.end(), {key, {&repair}});
+    if (repair.move > group->second.largest->move) group->second.largest = &repair;
+    ++group->second.count;
   }
-  std::vector<std::vector<ConstraintPoint>> points{panel.points};
-  select_rows(model, map, mass, points, {});
-  panel.points = std::move(points.front());
-}
-
-// Degree 1 and kinks have no second derivatives to strain rows' neighbours: such a face is refined before it is draped.
-bool carries_a_shell(const NurbsSurface& surface) {
-  for (const Direction d : {Direction::u, Direction::v}) {
-    const KnotVector& knots = surface.knots(d);
-    if (knots.degree() < 2) return false;
-    const std::vector<double> breaks = knots.breaks();
-    for (std::size_t k = 1; k + 1 < breaks.size(); ++k) {
-      if (knots.multiplicity(breaks[k]) >= knots.degree()) return false;
-    }
+  std::vector<std::string> out;
+  for (const auto& [key, group] : groups) {
+    const LoopRepair& repair = *group.largest;
+    out.push_back(
+        fmt::format("loop {}: {} at (u, v) = ({}, {})", repair.loop, repair.what, repair.place.x(), repair.place.y()));
+    if (repair.move > 0) out.back() += fmt::format(", by {:.2g}", repair.move);
+    if (group.count > 1) out.back() += fmt::format("; {} such, this the largest move", group.count);
   }
-  return true;
+  return out;
 }
 
 InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& options) {
@@ -91,21 +84,16 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   for (const TrimLoop& loop : panel.face.loops) panel.gaps.emplace_back(loop.index, gap(loop));
   const std::string who = fmt::format("panel '{}'", panel.face.name);
   panel.repairs = validate_loops(panel.face);
-  for (const LoopRepair& repair : panel.repairs) {
-    panel.warnings.push_back(fmt::format("{}: loop {}: {} at (u, v) = ({}, {})", who, repair.loop, repair.what,
-                                         repair.place.x(), repair.place.y()));
+  for (std::string& warning : repair_warnings(panel.repairs)) {
+    panel.warnings.push_back(fmt::format("{}: {}", who, std::move(warning)));
   }
   panel.topology = trace_trims(panel.face);
   panel.points = constraint_points(panel.face, panel.topology);
   panel.measure = measure(panel.face, panel.topology);
   panel.active_control_points = active_control_points(panel.face.surface, panel.topology);
-  if (options.select_rows && carries_a_shell(panel.face.surface)) {
-    decide_used(panel);
-  } else if (options.select_rows) {
-    panel.warnings.push_back(who +
-                             ": degree 1 or a kink at these knots: a drape refines it first; which points it takes "
-                             "shows with --degree 2");
-  }
+  const Closure closure = find_closure(panel.face.surface, same_place(panel.face.resolution, panel.face.surface));
+  merge_over_seams(close_exactly(panel.face.surface, closure), closure, panel.points);
+  merge_near_points(panel.face.surface, panel.points);
   return panel;
 }
 
@@ -178,6 +166,11 @@ nlohmann::ordered_json panel_json(const InspectedPanel& panel) {
                   {"cut", count_cells(panel, CellKind::cut)},
                   {"outside", count_cells(panel, CellKind::outside)}};
   out["active_control_points"] = panel.active_control_points;
+  const PredicateCounts& counts = panel.topology.counts;  // how often each level of arithmetic decided
+  out["predicates"] = {{"signs", counts.coefficient_signs},
+                       {"interval", counts.interval},
+                       {"exact", counts.exact},
+                       {"algebraic", counts.algebraic}};
   out["constraint_points"] = Json::array();
   for (const ConstraintPoint& point : panel.points) {
     const Eigen::Vector3d x = position(panel, point.u, point.v);
@@ -286,7 +279,7 @@ NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) 
   refinement.degree = options.degree;
   if (options.span) refinement.span = *options.span / face.metres_per_unit;
   if (options.spans) refinement.spans = {*options.spans, *options.spans};
-  refinement.tolerance = std::max(face.resolution, 1e-9 * bounding_box(surface).diagonal().norm());
+  refinement.tolerance = same_place(face.resolution, surface);
   try {
     return refine(surface, refinement).surface;
   } catch (const GeometryError& error) {
@@ -301,15 +294,71 @@ Inspection inspect(const PanelFile& file, const InspectOptions& options) {
   out.exporter = file.exporter;
   out.entities = file.entities;
   out.warnings = file.warnings;
-  for (const LedgerEntry& entry : file.ledger) {
-    if (entry.disposition == Disposition::converted || entry.disposition == Disposition::quarantined) {
-      out.ledger.push_back(entry);
-    }
-  }
+  out.ledger = file.ledger;
   for (const TrimmedSurface& face : file.panels) {
-    out.panels.push_back(inspect(face, options));
+    try {
+      out.panels.push_back(inspect(face, options));
+    } catch (const GeometryError& error) {
+      if (file.panels.size() == 1) throw;
+      out.refused.emplace_back(error.what());
+      continue;
+    }
     const auto& warnings = out.panels.back().warnings;
     out.warnings.insert(out.warnings.end(), warnings.begin(), warnings.end());
+  }
+  if (out.panels.empty() && !out.refused.empty()) throw GeometryError(out.refused.front());
+  return out;
+}
+
+namespace {
+
+const char* name(Disposition disposition) {
+  switch (disposition) {
+    case Disposition::read:
+      return "read";
+    case Disposition::converted:
+      return "converted";
+    case Disposition::kept:
+      return "kept as it is";
+    case Disposition::quarantined:
+      return "quarantined";
+  }
+  return "";
+}
+
+}  // namespace
+
+nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (const LedgerEntry& entry : ledger) {
+    nlohmann::ordered_json row = {{"entry", entry.sequence},
+                                  {"line", entry.line},
+                                  {"entity", entry.type},
+                                  {"form", entry.form},
+                                  {"disposition", name(entry.disposition)}};
+    if (!entry.why.empty()) row["why"] = utf8(entry.why);
+    out.push_back(std::move(row));
+  }
+  return out;
+}
+
+std::string ledger_text(const std::vector<LedgerEntry>& ledger) {
+  struct Row {
+    const LedgerEntry* first = nullptr;
+    int count = 0;
+  };
+  std::map<std::pair<int, Disposition>, Row> rows;
+  for (const LedgerEntry& entry : ledger) {
+    Row& row = rows[{entry.type, entry.disposition}];
+    if (row.count++ == 0) row.first = &entry;
+  }
+  std::string out = "  entity  count  what became of it\n";
+  for (const auto& [key, row] : rows) {
+    out += fmt::format("  {:>6} {:>6}  {}", key.first, row.count, name(key.second));
+    if (!row.first->why.empty())
+      out += row.count == 1 ? fmt::format(": line {}: {}", row.first->line, row.first->why)
+                            : fmt::format(": first at line {}: {}", row.first->line, row.first->why);
+    out += '\n';
   }
   return out;
 }
@@ -321,28 +370,18 @@ nlohmann::ordered_json inspect_json(const Inspection& inspection) {
   for (const InspectedPanel& panel : inspection.panels) panels.push_back(panel_json(panel));
   nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
   for (const std::string& warning : inspection.warnings) warnings.push_back(utf8(warning));
-  return {{"file", utf8(inspection.file)},   {"unit", utf8(inspection.unit)},   {"exporter", utf8(inspection.exporter)},
-          {"warnings", std::move(warnings)}, {"entities", std::move(entities)}, {"panels", std::move(panels)}};
+  nlohmann::ordered_json refused = nlohmann::ordered_json::array();
+  for (const std::string& panel : inspection.refused) refused.push_back(utf8(panel));
+  return {{"file", utf8(inspection.file)},         {"unit", utf8(inspection.unit)},
+          {"exporter", utf8(inspection.exporter)}, {"warnings", std::move(warnings)},
+          {"entities", std::move(entities)},       {"panels", std::move(panels)},
+          {"refused", std::move(refused)},         {"ledger", ledger_json(inspection.ledger)}};
 }
 
 std::string inspect_text(const Inspection& inspection, bool points) {
   std::string out = fmt::format("{}  {}{}\n", inspection.file, inspection.unit,
                                 inspection.exporter.empty() ? "" : ", written by " + inspection.exporter);
-  if (!inspection.entities.empty()) out += "  entities   ";
-  for (const auto& [type, count] : inspection.entities) out += fmt::format(" {} x {}", count, type);
-  if (!inspection.entities.empty()) out += '\n';
-  // Converted entities by type; what is left out one by one.
-  std::map<std::pair<int, std::string>, int> converted;
-  for (const LedgerEntry& entry : inspection.ledger) {
-    if (entry.disposition == Disposition::converted) {
-      ++converted[{entry.type, entry.why}];
-    } else {
-      out += fmt::format("  left out     line {}: entity {}: {}\n", entry.line, entry.type, entry.why);
-    }
-  }
-  for (const auto& [what, count] : converted) {
-    out += fmt::format("  converted    {} x {}: {}\n", count, what.first, what.second);
-  }
+  if (!inspection.ledger.empty()) out += ledger_text(inspection.ledger);
   constexpr std::size_t shown = 12;
   for (std::size_t k = 0; k < inspection.warnings.size() && (points || k < shown); ++k) {
     out += "  warning      " + inspection.warnings[k] + '\n';
@@ -350,6 +389,7 @@ std::string inspect_text(const Inspection& inspection, bool points) {
   if (!points && inspection.warnings.size() > shown) {
     out += fmt::format("  and {} warnings more: -v lists all\n", inspection.warnings.size() - shown);
   }
+  for (const std::string& panel : inspection.refused) out += "  refused      " + panel + '\n';
   if (inspection.panels.empty()) return out + "  no panel\n";
   out += overview(inspection);
   for (const InspectedPanel& panel : inspection.panels) out += curves_text(panel);

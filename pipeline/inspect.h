@@ -22,7 +22,6 @@ struct InspectOptions {
   std::optional<int> degree;
   std::optional<double> span;  // m, largest span length
   std::optional<int> spans;    // per direction
-  bool select_rows = true;     // say which points the projection takes, for the default fabric and no pins
 };
 
 // The face's surface, clamped, with these degrees and knots. Throws GeometryError where they can't be had.
@@ -42,13 +41,18 @@ struct InspectedPanel {
 struct Inspection {
   std::string file, unit, exporter;
   std::map<int, int> entities;
-  std::vector<LedgerEntry> ledger;    // what was converted or quarantined
+  std::vector<LedgerEntry> ledger;    // of every entity
   std::vector<std::string> warnings;  // of the file, then of the panels
   std::vector<InspectedPanel> panels;
+  std::vector<std::string> refused;   // panels without a valid trim: panel, loop and place
 };
 
-// Throws GeometryError where a panel has no valid trim, with panel, loop and place.
+// Throws GeometryError where no panel has a valid trim, with panel, loop and place of the first.
 Inspection inspect(const PanelFile& file, const InspectOptions& options = {});
+
+// The ledger by kind of entity and what became of it, with the first reason and its line; for programs, every entity.
+std::string ledger_text(const std::vector<LedgerEntry>& ledger);
+nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger);
 
 // A table of the panels and their curves; `points`: with the constraint points one by one.
 std::string inspect_text(const Inspection& inspection, bool points = false);

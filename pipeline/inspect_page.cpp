@@ -65,15 +65,14 @@ std::string inspect_html(const Inspection& inspection) {
          fmt::format("{} of {}", std::ranges::count(panel.points, true, &ConstraintPoint::used), panel.points.size())});
   }
   out += "</table>\n";
-  if (!inspection.warnings.empty() || !inspection.ledger.empty()) {
+  if (!inspection.warnings.empty() || !inspection.refused.empty()) {
     out += "<h2>Warnings</h2>\n<ul class=\"warnings\">\n";
     for (const std::string& warning : inspection.warnings) out += "<li>" + svg_escape(warning) + "</li>\n";
-    for (const LedgerEntry& entry : inspection.ledger) {
-      out += fmt::format("<li>{} line {}: entity {}: {}</li>\n",
-                         entry.disposition == Disposition::converted ? "converted:" : "left out:", entry.line,
-                         entry.type, svg_escape(entry.why));
-    }
+    for (const std::string& panel : inspection.refused) out += "<li>refused: " + svg_escape(panel) + "</li>\n";
     out += "</ul>\n";
+  }
+  if (!inspection.ledger.empty()) {
+    out += "<h2>Entities</h2>\n<pre>" + svg_escape(ledger_text(inspection.ledger)) + "</pre>\n";
   }
   out += "<h2>Panels</h2>\n" + inspect_svg(inspection);
   out += "<h2>Curves</h2>\n";

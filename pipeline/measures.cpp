@@ -90,6 +90,8 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
     nominal.push_back(at.nominal);
     second_pk.emplace_back(at.second_pk.head<2>());
     reach(at.position);
+    const Eigen::Vector3d start = model.state(s.panel, s.uv.x(), s.uv.y(), build.start).position;
+    m.largest_deflection = std::max(m.largest_deflection, (at.position - start).norm());
   }
   m.strain = extremes(strain, samples);
   m.nominal = extremes(nominal, samples);
@@ -110,8 +112,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
       for (std::size_t a = 0; a < row.row.index.size(); ++a) {
         y += row.row.value[a] * q.segment<3>(3 * row.row.index[a]);
       }
-      double& largest = row.guard ? m.at_guards_max : m.at_constraints_max;
-      largest = std::max(largest, std::abs(0.5 * (y.squaredNorm() - 1)));
+      m.at_constraints_max = std::max(m.at_constraints_max, std::abs(0.5 * (y.squaredNorm() - 1)));
     }
   }
   for (const ShellPanel& panel : model.panels()) {

@@ -27,8 +27,8 @@ struct StateMeasures {
   Extremes nominal;                        // N/m, membrane part
   Extremes second_pk;                      // N/m, membrane part
   double at_constraints_max = 0;           // largest |E| of the strain rows taken (of all points where no limit is on)
-  double at_guards_max = 0;                // the same of guard rows: redundant at rest, softly held
   double lowest = 0, highest = 0;          // m, along the scene's "up" (against gravity; z without gravity)
+  double largest_deflection = 0;           // m, of the grid's points from where the run started
   double area = 0, mass = 0;               // m2, kg, of the rest
   std::vector<Eigen::Vector3d> points;     // those that the scene asks for [m]
   std::vector<Eigen::Vector3d> reactions;  // per pin: force on the cloth [N]

@@ -127,16 +127,16 @@ struct FrameWriter::Impl {
   }
 };
 
-FrameWriter::FrameWriter(const Build& build, std::filesystem::path directory)
+FrameWriter::FrameWriter(const Build& build, std::filesystem::path directory, const std::vector<double>& written)
     : impl_(new Impl{build, std::move(directory) / "frames", {}, {}, false}) {
   for (const BuiltPanel& panel : build.panels) impl_->triangles.push_back(triangulate(panel.face, panel.topology));
   for (const FrameFormat format : build.scene.formats) {
     switch (format) {
       case FrameFormat::vtu:
-        impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name));
+        impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name, written));
         break;
       case FrameFormat::obj:
-        impl_->sinks.push_back(std::make_unique<ObjSink>(impl_->frames));
+        impl_->sinks.push_back(std::make_unique<ObjSink>(impl_->frames, static_cast<int>(written.size())));
         break;
       case FrameFormat::iges:
         impl_->iges = true;
@@ -149,7 +149,8 @@ FrameWriter::~FrameWriter() = default;
 
 void FrameWriter::write(const RunFrame& frame) {
   if (impl_->iges) {
-    write_file(impl_->frames / fmt::format("frame_{:04}.igs", frame.number), draped_file(impl_->build, frame.q).text);
+    write_file(impl_->frames / fmt::format("frame_{:04}.igs", frame.number), draped_file(impl_->build, frame.q).text,
+               Flush::no);
   }
   if (impl_->sinks.empty()) return;
   const Impl::Shown shown = impl_->show(frame.system, frame.q, &frame.velocity);

@@ -22,10 +22,10 @@ namespace toile {
 //   (2) both faces have the same knots and weights, and contain the file's knots.
 IgesOutput draped_file(const Build& build, const Eigen::VectorXd& q);
 
-// Frames to DIR/frames in the scene's formats; remembers the last one for the picture.
+// Frames to DIR/frames in the scene's formats; `written`: times of those that a resumed run has made before.
 class FrameWriter {
  public:
-  FrameWriter(const Build& build, std::filesystem::path directory);
+  FrameWriter(const Build& build, std::filesystem::path directory, const std::vector<double>& written = {});
   ~FrameWriter();
   void write(const RunFrame& frame);
   // Bytes of preview.png of a state; empty where the program draws no pictures.
@@ -36,7 +36,7 @@ class FrameWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-// report.json by the contract of the README. Only `seconds` and `wall_*` differ between runs of one scene.
+// report.json by the contract of the README. Only `seconds`, `counters` and `wall_*` differ between runs of one scene.
 nlohmann::ordered_json report_json(const Build& build, const RunResult& result, const StateMeasures& measures,
                                    double write_seconds);
 

@@ -24,6 +24,39 @@ Json measured(double value, const char* unit) {
   return {{"value", value}, {"unit", unit}};
 }
 
+Json panel_json(const BuiltPanel& panel) {
+  const NurbsSurface& s = panel.face.surface;
+  const KnotMesh& mesh = panel.topology.mesh;
+  const auto cells = [&](CellKind kind) { return std::ranges::count(panel.topology.cells, kind); };
+  return {
+      {"name", panel.name},
+      {"degree", {s.u().degree(), s.v().degree()}},
+      {"spans", {mesh.u.size() - 1, mesh.v.size() - 1}},
+      {"control_points", {s.count_u(), s.count_v()}},
+      {"cells",
+       {{"inside", cells(CellKind::inside)}, {"cut", cells(CellKind::cut)}, {"outside", cells(CellKind::outside)}}}};
+}
+
+// What studies look at by name. A number that doesn't exist (nothing fell, so nothing can be compared with its work)
+// is left out.
+Json measures_json(const RunResult& run, const StateMeasures& m) {
+  Json measures = {{"area", measured(m.area, "m2")},
+                   {"mass", measured(m.mass, "kg")},
+                   {"lowest", measured(m.lowest, "m")},
+                   {"highest", measured(m.highest, "m")},
+                   {"largest_deflection", measured(m.largest_deflection, "m")},
+                   {"strain_max", measured(m.strain.max.maxCoeff(), "1")},
+                   {"strain_min", measured(m.strain.min.minCoeff(), "1")},
+                   {"strain_p999", measured(m.strain.p999.maxCoeff(), "1")},
+                   {"strain_mean_abs", measured(m.strain.mean_abs.mean(), "1")}};
+  const double fall = -run.energy.gravity;
+  if (fall > 0) measures["injected_over_gravity_work"] = measured(run.energy.injected / fall, "1");
+  for (std::size_t k = 0; k < m.points.size(); ++k) {
+    measures["point_" + std::to_string(k)] = {{"value", array(m.points[k])}, {"unit", "m"}};
+  }
+  return measures;
+}
+
 }  // namespace
 
 Json report_json(const Build& build, const RunResult& run, const StateMeasures& m, double write_seconds) {
@@ -34,13 +67,17 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["version"] = version();
   report["exit"] = name(run.exit);
   if (run.exit != RunExit::ok) report["reason"] = run.reason;
+  report["model"] = "shell";
+  report["scheme"] = "verlet";
+  report["panels"] = Json::array();
+  for (const BuiltPanel& panel : build.panels) report["panels"].push_back(panel_json(panel));
   report["frames"] = run.frames;
   report["steps"] = run.steps;
   report["redone_steps"] = run.redone_steps;
   report["simulated_seconds"] = run.time;
   const double computing = run.wall_seconds - run.frame_seconds;
   report["wall_seconds"] = computing;
-  report["wall_seconds_per_frame"] = run.time > 0 ? computing / (run.time * 30) : 0.0;
+  report["wall_seconds_per_frame"] = run.time > run.from ? computing / ((run.time - run.from) * 30) : 0.0;
   report["seconds"] = {{"read", build.read_seconds},
                        {"trim", build.trim_seconds},
                        {"force", run.force_seconds},
@@ -67,8 +104,8 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"p999_warp", m.strain.p999[1]},
                       {"mean_abs_weft", m.strain.mean_abs[0]},
                       {"mean_abs_warp", m.strain.mean_abs[1]},
-                      {"at_constraints_max", m.at_constraints_max},
-                      {"at_guards_max", m.at_guards_max}};
+                      {"at_constraints_max", m.at_constraints_max}};
+  if (scene.strain_limit.on) report["strain"]["limit"] = scene.strain_limit.tolerance;
   report["points"] = Json::array();
   for (std::size_t k = 0; k < m.points.size(); ++k) {
     report["points"].push_back(
@@ -84,7 +121,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["stress"]["part"] =
       system.strain_rows > 0 ? "membrane only: what the strain limit carries is not in it" : "whole";
   const EnergyBalance& e = run.energy;
-  report["energy"] = {{"kinetic", e.kinetic},         {"membrane", e.membrane},       {"bending", e.bending},
+  report["energy"] = {{"kinetic", e.kinetic},         {"membrane", e.membrane},       {"bending", e.bending}, {"limit", e.limit},
                       {"gravity", e.gravity},         {"dissipated", e.dissipated()}, {"loads_work", e.load_work},
                       {"motion_work", e.motion_work}, {"injected", e.injected}};
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
@@ -95,14 +132,26 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   Json stages = Json::array({"shell"});
   if (system.projection) stages.push_back("projection");
   report["stages"] = stages;
+  // What each stage that ran took. `seconds` above counts the same seconds, of stages that didn't run too.
+  Json counters = {{"shell", {{"seconds", run.force_seconds}, {"bytes", build.model->table_bytes()}}}};
+  if (system.projection) {
+    counters["projection"] = {{"seconds", run.projection_seconds},
+                              {"bytes", sizeof(double) * system.projection->factor_nonzeros()}};
+  }
+  counters["steps"] = {{"count", run.steps + run.redone_steps}};
+  if (!scene.dt) counters["time_step"] = {{"seconds", run.bound_seconds}};
+  if (!scene.formats.empty()) counters["frames"] = {{"seconds", run.frame_seconds}};
+  if (run.allocations.known) {
+    counters["steps"]["allocations"] = run.allocations.steps;
+    if (!scene.dt) counters["time_step"]["allocations"] = run.allocations.bound;
+    if (!scene.formats.empty()) counters["frames"]["allocations"] = run.allocations.frames;
+  }
+  report["counters"] = counters;
   Json warnings = Json::array();
   for (const std::string& w : build.warnings) warnings.push_back(w);
   for (const std::string& w : run.warnings) warnings.push_back(w);
   report["warnings"] = warnings;
-  report["measures"] = {{"area", measured(m.area, "m2")},
-                        {"mass", measured(m.mass, "kg")},
-                        {"lowest", measured(m.lowest, "m")},
-                        {"highest", measured(m.highest, "m")}};
+  report["measures"] = measures_json(run, m);
   return report;
 }
 

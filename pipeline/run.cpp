@@ -20,21 +20,11 @@ double since(Clock::time_point start) {
 
 constexpr double step_safety = 0.9;                   // of the eigenvalue bound
 constexpr int steps_per_bound = 100;                  // the bound costs some 40 forces
+// The squared frequency that a taut row gives its nodes on a uniform net, over what ProjectionReport::tension says; how much
+// of the bound's eigenvalue it may grow by before the bound is asked again.
+constexpr double taut_factor = 5.4, taut_growth = 0.1;
 constexpr double smallest_scale = 1.0 / 1024;         // ten halvings of the planned step
 constexpr double step_rise = 0.05, total_rise = 0.2;  // of the energy turned over
-
-// Kinetic energy that the dead loads alone give free nodes in a step from rest, over dt^2 and times four: what the
-// velocity at the end of a step, which is not projected, may hold too much. (design.md, "Multipliers and velocity")
-// Made from the loads, not from the state, so that it can't grow with an instability.
-double load_noise(const DynamicSystem& system) {
-  Eigen::VectorXd force(3 * system.map->nodes());
-  system.map->reduce(system.loads.force, force);
-  double sum = 0;
-  for (Eigen::Index k = 0; k < system.node_mass.size(); ++k) {
-    sum += force.segment<3>(3 * k).squaredNorm() / system.node_mass[k];
-  }
-  return 2 * sum;
-}
 
 // Kinetic energy that nobody sees: of cloth that would cross its own distance from the origin in 1e8 s, or that moves
 // by the rounding of its places in a step. Without loads there is nothing else to compare a rise with.
@@ -46,26 +36,36 @@ double rounding_energy(const DynamicSystem& system, const Eigen::VectorXd& q, do
 
 class Loop {
  public:
-  Loop(const Build& build, const RunHooks& hooks)
-      : build_(build), scene_(build.scene), hooks_(hooks), frame_times_(frame_times(scene_)) {}
+  // Without a system, `from` is a run that has yet to begin.
+  Loop(const Build& build, RunResult from, const RunHooks& hooks)
+      : build_(build), scene_(build.scene), hooks_(hooks), frame_times_(frame_times(scene_)), result_(std::move(from)) {
+    result_.from = result_.state.t;
+    result_.allocations.known = static_cast<bool>(hooks.allocations);
+  }
 
   RunResult operator()() {
-    const Clock::time_point start = Clock::now();
-    begin();
-    emit_frame();
+    if (result_.system) {
+      require_time_left(build_, result_);
+    } else {
+      begin();
+      emit_frame();
+      finish_target(0);
+    }
     for (const double target : targets()) {
       while (result_.exit == RunExit::ok && result_.state.t < target) advance(target);
       if (result_.exit != RunExit::ok) break;
       release(target);
       if (is_frame(target)) emit_frame();
+      finish_target(target);
     }
     if (result_.exit == RunExit::ok && !result_.last_projection.converged) report_limit();
     result_.time = result_.state.t;
     const Eigen::VectorXd moved = control_points(*result_.system, result_.state) - build_.start;
+    result_.energy.gravity = 0;
     for (int i = 0; i < build_.model->control_point_count(); ++i) {
       result_.energy.gravity -= build_.model->lumped_mass()[i] * scene_.gravity.dot(moved.segment<3>(3 * i));
     }
-    result_.wall_seconds = since(start);
+    result_.wall_seconds = since(start_);
     return std::move(result_);
   }
 
@@ -74,90 +74,122 @@ class Loop {
     result_.system = assemble(build_, 0);
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(build_.start.size());
     result_.state = state_from(*result_.system, build_.start, zero, 0);
+    settle();
     result_.last_projection.converged = true;
-    Eigen::VectorXd force(build_.start.size());
-    const ShellEnergy elastic = build_.model->internal_force(build_.start, force);
+    const Eigen::VectorXd q = control_points(*result_.system, result_.state);
+    Eigen::VectorXd force(q.size());
+    const ShellEnergy elastic = build_.model->internal_force(q, force);
     result_.energy.membrane = elastic.membrane;
     result_.energy.bending = elastic.bending;
-    result_.energy.start = elastic.total();
-    scale_ = elastic.total();
+    result_.energy.limit = limit_energy();
+    result_.energy.start = result_.energy.elastic();
+    result_.loop.scale = result_.energy.start;
     evaluate_bound();
-    rounding_ = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
+    result_.loop.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
   }
 
+  long allocations() const { return hooks_.allocations ? hooks_.allocations() : 0; }
+  void resumable() const {
+    if (hooks_.resumable) hooks_.resumable(result_);
+  }
+  void finish_target(double t) {
+    result_.loop.done = t;
+    resumable();
+  }
+
+  // Times that steps land on, from here on.
   std::vector<double> targets() const {
-    std::set<double> times;
-    for (const double t : frame_times_) times.insert(t);
+    std::set<double> times(frame_times_.begin(), frame_times_.end());
     for (const ScenePin& pin : scene_.pins) {
       if (pin.release && *pin.release > 0 && *pin.release < scene_.until) times.insert(*pin.release);
     }
-    times.erase(0.0);
+    std::erase_if(times, [&](double t) { return t <= result_.loop.done || t < result_.state.t; });
     return {times.begin(), times.end()};
   }
   bool is_frame(double t) const { return std::ranges::binary_search(frame_times_, t); }
 
   void evaluate_bound() {
-    noise_ = load_noise(result_.system->dynamic);
-    steps_since_bound_ = 0;
-    dt_scale_ = std::min(1.0, 2 * dt_scale_);
+    result_.loop.steps_since_bound = 0;
+    result_.loop.dt_scale = std::min(1.0, 2 * result_.loop.dt_scale);
     if (scene_.dt) return;
     const Clock::time_point start = Clock::now();
+    const long asked = allocations();
     const System& system = *result_.system;
-    result_.bound =
-        time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, control_points(system, result_.state));
+    result_.bound = bound_of(system);
+    result_.loop.tension_at_bound = result_.last_projection.tension;
     result_.bound_seconds += since(start);
+    result_.allocations.bound += allocations() - asked;
+  }
+
+  TimeStepBound bound_of(const System& system) const {
+    Pull pull{system.projection.get(), {}};
+    if (pull.projection) pull.tensions = system.projection->tensions(result_.state.x, result_.state.t);
+    return time_step_bound(*build_.model, *system.map, system.dynamic.node_mass,
+                           control_points(system, result_.state), pull);
+  }
+  double limit_energy() const {
+    const System& system = *result_.system;
+    return system.projection ? system.projection->energy(result_.state.x, result_.state.t) : 0;
+  }
+  bool tauter() const {
+    return taut_factor * (result_.last_projection.tension - result_.loop.tension_at_bound) > taut_growth * result_.bound.eigenvalue;
   }
 
   void advance(double target) {
-    if (steps_since_bound_ >= steps_per_bound) evaluate_bound();
-    const double largest = dt_scale_ * planned_step(scene_, result_.bound);
+    if (result_.loop.steps_since_bound >= steps_per_bound || (!scene_.dt && tauter())) evaluate_bound();
+    const double largest = result_.loop.dt_scale * planned_step(scene_, result_.bound);
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
     const double count = std::max(1.0, std::ceil(left / largest * (1 - 1e-9)));
     double dt = left / count;
     if (!(dt > 0) || result_.state.t + dt == result_.state.t) {
+      result_.accepted = RunState(result_);
       fail(fmt::format("the step of {:.3g} s is too small to advance the time", dt));
       return;
     }
     for (bool halved = false;; halved = true) {
-      DynamicState before = result_.state;
+      const long asked = allocations();
+      before_ = result_.state;
       const StepReport report = step(result_.system->dynamic, result_.state, dt);
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
+      result_.allocations.steps += allocations() - asked;
       const std::string trouble = judge(report);
       if (trouble.empty()) {
         accept(report);
         // The last step of a stretch ends on the target itself, not on a rounded sum.
         if (count == 1 && !halved) result_.state.t = target;
-        if (halved) steps_since_bound_ = 0;
+        if (halved) result_.loop.steps_since_bound = 0;
         break;
       }
-      result_.state = std::move(before);
+      std::swap(result_.state, before_);
+      if (!halved) result_.accepted = RunState(result_);
       ++result_.redone_steps;
-      if (dt_scale_ <= smallest_scale) {
+      if (result_.loop.dt_scale <= smallest_scale) {
         fail(fmt::format("{}, even with a step of {:.3g} s", trouble, dt));
         return;
       }
-      settle();
       dt /= 2;
-      dt_scale_ /= 2;
+      result_.loop.dt_scale /= 2;
     }
     if (hooks_.progress) hooks_.progress({result_.state.t, scene_.until, dt, result_.steps, result_.frames});
-    if (hooks_.stop && hooks_.stop()) {
-      result_.exit = RunExit::interrupted;
-      result_.reason = "interrupted";
+    result_.accepted.reset();
+    resumable();
+    if (hooks_.stop) result_.exit = hooks_.stop();
+    if (result_.exit != RunExit::ok) {
+      result_.reason = fmt::format("{} at t = {:.6g} s of {:.6g} s",
+                                   result_.exit == RunExit::time_limit ? "stopped by the time limit" : "interrupted",
+                                   result_.state.t, scene_.until);
     }
   }
 
-  // Takes what the tolerance left of the constraints' violation out of the places and leaves the velocities alone. A step
-  // turns such a rest into a velocity of rest / dt: without this, the smaller step would only be the wilder one.
+  // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest / dt.
   void settle() {
     const System& system = *result_.system;
-    if (!system.projection) return;
-    constexpr int rounds = 10;
-    const Eigen::VectorXd before = control_points(system, result_.state);
-    for (int k = 0; k < rounds; ++k) system.projection->project(result_.state.x, result_.state.t);
-    result_.energy.load_work += system.dynamic.loads.force.dot(control_points(system, result_.state) - before);
+    if (!system.projection || system.projection->measure(result_.state.x, 0).converged) return;
+    const ProjectionReport report = system.projection->project(result_.state.x, 0);
+    result_.warnings.push_back(fmt::format("the start broke the strain limit or missed a pin; moved onto them{}",
+                                           report.converged ? "" : " as far as they allow"));
     initialise(system.dynamic, result_.state);
   }
 
@@ -165,27 +197,29 @@ class Loop {
   std::string judge(const StepReport& report) {
     if (!report.finite) return "the numbers are no longer finite";
     const EnergyBalance& e = result_.energy;
-    const double now = report.kinetic + report.elastic.total();
-    const double work =
-        e.load_work + e.drag_work + e.motion_work + report.load_work + report.drag_work + report.motion_work;
+    const double elastic = report.elastic.total() + report.limit_energy;
+    const double now = report.kinetic + 0.5 * (e.elastic() + elastic);
+    const double work = e.load_work + e.drag_work + e.motion_work +
+                        0.5 * (report.load_work + report.drag_work + report.motion_work);
     const double balance = now - e.start - work;
-    const double turned = std::max({scale_, std::abs(e.load_work + report.load_work),
+    const double turned = std::max({result_.loop.scale, std::abs(e.load_work + report.load_work),
                                     std::abs(e.motion_work + report.motion_work), std::abs(e.drag_work), e.now()});
-    const double noise = noise_ * report.dt * report.dt + rounding_;
-    if (balance - balance_ > step_rise * turned + noise) {
+    const double smaller_step = report.dt < (1 - 1e-9) * result_.dt_last ? result_.loop.kick : 0;
+    if (balance - result_.loop.balance > step_rise * turned + smaller_step + result_.loop.rounding) {
       return fmt::format(
           "the energy rises by {:.3g} J in a step without work that would explain it ({:.3g} J turned over)",
-          balance - balance_, turned);
+          balance - result_.loop.balance, turned);
     }
-    // What an accepted step was allowed stays allowed, or no smaller step could ever follow it.
-    const double total_noise = std::max(noise, allowed_noise_);
-    if (balance > total_rise * turned + total_noise) {
+    // What the end of the step holds can't exceed the budget either.
+    const double stored = report.kinetic_end + elastic - e.start - e.load_work - e.drag_work - e.motion_work -
+                          report.load_work - report.drag_work - report.motion_work;
+    if (std::max(balance, stored) > total_rise * turned + result_.loop.rounding) {
       return fmt::format("the energy has risen by {:.3g} J without work that would explain it ({:.3g} J turned over)",
-                         balance, turned);
+                         std::max(balance, stored), turned);
     }
-    scale_ = turned;
-    allowed_noise_ = total_noise;
-    balance_ = balance;
+    result_.loop.scale = turned;
+    result_.loop.kick = report.kick;
+    result_.loop.balance = balance;
     return {};
   }
 
@@ -194,10 +228,11 @@ class Loop {
     e.kinetic = report.kinetic;
     e.membrane = report.elastic.membrane;
     e.bending = report.elastic.bending;
+    e.limit = report.limit_energy;
     e.load_work += report.load_work;
     e.drag_work += report.drag_work;
     e.motion_work += report.motion_work;
-    e.injected = std::max(e.injected, balance_);
+    e.injected = std::max(e.injected, result_.loop.balance);
     result_.dt_min = result_.steps == 0 ? report.dt : std::min(result_.dt_min, report.dt);
     result_.dt_max = std::max(result_.dt_max, report.dt);
     result_.dt_last = report.dt;
@@ -206,7 +241,7 @@ class Loop {
     result_.iterations_max = std::max(result_.iterations_max, report.projection.iterations);
     if (!report.projection.converged) ++result_.unconverged_steps;
     ++result_.steps;
-    ++steps_since_bound_;
+    ++result_.loop.steps_since_bound;
   }
 
   void release(double t) {
@@ -216,6 +251,7 @@ class Loop {
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
     result_.system = assemble(build_, t);
+    result_.loop.assembled = t;
     result_.state = state_from(*result_.system, q, v, t);
     // The released control points' kinetic energy joins the balance.
     double kinetic = 0;
@@ -223,20 +259,24 @@ class Loop {
     for (Eigen::Index k = 0; k < dynamic.node_mass.size(); ++k) {
       kinetic += 0.5 * dynamic.node_mass[k] * result_.state.v.segment<3>(3 * k).squaredNorm();
     }
-    result_.energy.start += kinetic - result_.energy.kinetic;
+    result_.energy.start += kinetic - result_.energy.kinetic + limit_energy() - result_.energy.limit;
     result_.energy.kinetic = kinetic;
+    result_.energy.limit = limit_energy();
     result_.last_projection.converged = true;
     evaluate_bound();
   }
 
   void emit_frame() {
     const Clock::time_point start = Clock::now();
+    const long asked = allocations();
     const int number = result_.frames++;
+    result_.frame_times.push_back(result_.state.t);
     if (!hooks_.frame) return;
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
     hooks_.frame({number, result_.state.t, *result_.system, q, v});
     result_.frame_seconds += since(start);
+    result_.allocations.frames += allocations() - asked;
   }
 
   std::string worst_place() const {
@@ -255,7 +295,7 @@ class Loop {
     const System& system = *result_.system;
     const Eigen::VectorXd q = control_points(system, result_.state);
     if (q.allFinite()) {
-      const TimeStepBound bound = time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, q);
+      const TimeStepBound bound = bound_of(system);
       where = fmt::format("; the stiffest place is {} ({}), which needs steps below {:.3g} s",
                           describe_cell(build_, bound.cell), bound.bending ? "bending" : "membrane", bound.dt);
     }
@@ -286,10 +326,8 @@ class Loop {
   const RunHooks& hooks_;
   std::vector<double> frame_times_;
   RunResult result_;
-  double dt_scale_ = 1, scale_ = 0, balance_ = 0;
-  double noise_ = 0, allowed_noise_ = 0;  // J/s2, J
-  double rounding_ = 0;                   // J
-  int steps_since_bound_ = 0;
+  DynamicState before_;  // the last step
+  const Clock::time_point start_ = Clock::now();
 };
 
 }  // namespace
@@ -304,6 +342,8 @@ const char* name(RunExit exit) {
       return "check";
     case RunExit::interrupted:
       return "interrupted";
+    case RunExit::time_limit:
+      return "time_limit";
   }
   return "";
 }
@@ -331,8 +371,19 @@ std::string describe_cell(const Build& build, const ShellModel::Cell& cell) {
                      cell.j, mesh.u[i], mesh.u[i + 1], mesh.v[j], mesh.v[j + 1]);
 }
 
+void require_time_left(const Build& build, const RunState& state) {
+  const Scene& scene = build.scene;
+  if (state.state.t <= scene.until) return;
+  throw InputError(fmt::format("{}: solver.until is {} s, but the run to be resumed is at {} s already",
+                               scene.path.string(), scene.until, state.state.t));
+}
+
 RunResult run(const Build& build, const RunHooks& hooks) {
-  return Loop(build, hooks)();
+  return Loop(build, {}, hooks)();
+}
+
+RunResult run(const Build& build, RunResult from, const RunHooks& hooks) {
+  return Loop(build, std::move(from), hooks)();
 }
 
 }  // namespace toile

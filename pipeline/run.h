@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,8 @@
 
 namespace toile {
 
-enum class RunExit { ok, solver_failed, check_failed, interrupted };
-const char* name(RunExit exit);  // "ok", "solver", "check", "interrupted", as in report.json
+enum class RunExit { ok, solver_failed, check_failed, interrupted, time_limit };
+const char* name(RunExit exit);  // "ok", "solver", "check", "interrupted", "time_limit", as in report.json
 
 // A state as frames show it.
 struct RunFrame {
@@ -29,49 +30,90 @@ struct RunProgress {
   int steps = 0, frames = 0;
 };
 
-struct RunHooks {
-  std::function<void(const RunFrame&)> frame;        // at 0, at every multiple of `every`, at `until`; in order
-  std::function<void(const RunProgress&)> progress;  // after each step
-  std::function<bool()> stop;                        // asked after each step: finish now, exit interrupted
-};
-
 struct EnergyBalance {
-  double kinetic = 0, membrane = 0, bending = 0;         // J, now
+  double kinetic = 0;                                    // J, in the middle of the last step
+  double membrane = 0, bending = 0, limit = 0;           // J, now; limit: of the strain limits
   double start = 0;                                      // J, kinetic and elastic at the start
   double load_work = 0, drag_work = 0, motion_work = 0;  // J, since the start
   double gravity = 0;                                    // J, potential against the start
   double injected = 0;  // J, largest rise of the balance above the start, 0 where it never rose
-  double now() const { return kinetic + membrane + bending; }
+  double elastic() const { return membrane + bending + limit; }
+  double now() const { return kinetic + elastic(); }
   // What drag and projection took.
   double dissipated() const { return start + load_work + motion_work - now(); }
 };
 
-struct RunResult {
-  RunExit exit = RunExit::ok;
-  std::string reason;  // why the run isn't ok: what, where, what to change
+// What the step loop carries from step to step besides the state of the cloth.
+struct LoopState {
+  double assembled = 0;  // s, time whose pins hold
+  double done = -1;      // s, last frame or release time that is dealt with; none at first
+  double dt_scale = 1;   // of the planned step
+  int steps_since_bound = 0;
+  double scale = 0, balance = 0;           // J, energy turned over; unexplained rise
+  double rounding = 0;                     // J, that nobody sees
+  double kick = 0;                         // J, of the last accepted step: what a smaller step may seem to gain
+  double tension_at_bound = 0;             // 1/s2, ProjectionReport::tension when the step bound was evaluated
+};
+
+// Calls of the memory allocator; warming up is among them.
+struct AllocationCounts {
+  bool known = false;
+  long steps = 0, bound = 0, frames = 0;
+};
+
+// All of a run that a later one needs to go on with the same bits, and nothing that depends on the clock. A field more:
+// a word in checkpoint.cpp.
+struct RunState {
+  DynamicState state;
+  LoopState loop;
   int frames = 0, steps = 0, redone_steps = 0;
-  double time = 0;
+  std::vector<double> frame_times;  // s, of the frames so far
   double dt_min = 0, dt_max = 0, dt_last = 0;
   TimeStepBound bound;  // the last one evaluated
   EnergyBalance energy;
   double iterations_sum = 0;
   int iterations_max = 0, unconverged_steps = 0;
   ProjectionReport last_projection;
-  double wall_seconds = 0, force_seconds = 0, projection_seconds = 0, bound_seconds = 0, frame_seconds = 0;
-  std::unique_ptr<System> system;  // of the last state
-  DynamicState state;
   std::vector<std::string> warnings;
 };
 
+struct RunResult : RunState {
+  RunExit exit = RunExit::ok;
+  std::string reason;  // why the run isn't ok: what, where, what to change
+  double time = 0;
+  std::unique_ptr<System> system;  // of the last state
+  // Where the solver failed: the run before the step that could not be made.
+  std::optional<RunState> accepted;
+  // Of this process alone, which began at `from` [s].
+  double from = 0;
+  double wall_seconds = 0, force_seconds = 0, projection_seconds = 0, bound_seconds = 0, frame_seconds = 0;
+  AllocationCounts allocations;
+};
+
+struct RunHooks {
+  std::function<void(const RunFrame&)> frame;        // at 0, at every multiple of `every`, at `until`; in order
+  std::function<void(const RunProgress&)> progress;  // after each step
+  // After the first frame, each step and each later frame: a run may be taken up from here.
+  std::function<void(const RunResult&)> resumable;
+  std::function<long()> allocations;  // of the program so far; unset: not counted
+  std::function<RunExit()> stop;  // asked after each step, so that every run gets ahead; not ok: finish now with this
+};
+
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
-// state, evaluated anew every 100 steps.
+// state, evaluated anew every 100 steps and when the cloth has grown much tauter.
 //   (1) every number of an accepted step is finite;
-//   (2) kinetic + elastic energy less the work of loads, drag and moved pins rises in a step by no more than 5 %
-//       of the energy turned over so far, and in all by no more than 20 %, far less than an unstable step soon does.
+//   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from step
+//       to step by no more than 5 % of the energy turned over so far, and in all by no more than 20 %, far less than an
+//       unstable step soon does.
 //       A step that breaks this is redone with half the step; the planned step is halved ten times at most, then the
 //       run ends as solver_failed at the last accepted state.
 // The step is deterministic: no decision depends on time of day, addresses or thread count.
 RunResult run(const Build& build, const RunHooks& hooks = {});
+
+// Goes on from a run of the same build (read_checkpoint): the end is that of a run that never stopped, to the bit,
+// unless `until` or `every` are others now. Throws InputError where `until` has passed already.
+RunResult run(const Build& build, RunResult from, const RunHooks& hooks = {});
+void require_time_left(const Build& build, const RunState& state);
 
 // The first system and its step bound, for a dry run. Times of the frames of a scene.
 std::vector<double> frame_times(const Scene& scene);

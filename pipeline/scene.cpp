@@ -2,14 +2,9 @@
 
 #include <fmt/format.h>
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wconversion"
-#pragma GCC diagnostic ignored "-Wshadow"
-#include <toml++/toml.h>
-#pragma GCC diagnostic pop
-
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <numbers>
@@ -17,225 +12,13 @@
 #include "geometry/error.h"
 #include "io/file.h"
 #include "io/panel_file.h"
+#include "pipeline/toml_table.h"
 #include "pipeline/units.h"
 
 namespace toile {
 namespace {
 
 constexpr double degree_in_radians = std::numbers::pi / 180;
-
-int edit_distance(std::string_view a, std::string_view b) {
-  std::vector<int> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = static_cast<int>(j);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    int diagonal = row[0];
-    row[0] = static_cast<int>(i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const int replaced = diagonal + (a[i - 1] != b[j - 1]);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row[b.size()];
-}
-
-// "; did you mean 'grain_deg'?", or the list of what is possible.
-std::string suggestion(std::string_view word, const std::vector<std::string>& possible) {
-  const std::string* best = nullptr;
-  int distance = std::max(2, static_cast<int>(word.size()) / 3);
-  for (const std::string& p : possible) {
-    const int d = edit_distance(word, p);
-    if (d <= distance && (!best || d < distance)) {
-      best = &p;
-      distance = d;
-    }
-  }
-  if (best) return fmt::format("; did you mean '{}'?", *best);
-  return fmt::format("; possible are {}", fmt::join(possible, ", "));
-}
-
-const char* type_name(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "an array";
-    case toml::node_type::string:
-      return "a string";
-    case toml::node_type::integer:
-      return "a whole number";
-    case toml::node_type::floating_point:
-      return "a number";
-    case toml::node_type::boolean:
-      return "true or false";
-    default:
-      return "a date or time";
-  }
-}
-
-enum class Range { any, nonnegative, positive };
-
-// Keys of one table, each asked for by name; what nobody asked for is an error.
-class Table {
- public:
-  Table(const toml::table& table, std::string name, std::string file)
-      : table_(table), name_(std::move(name)), file_(std::move(file)) {}
-
-  const toml::node* find(const std::string& key) {
-    known_.push_back(key);
-    return table_.get(key);
-  }
-
-  std::string place(const toml::node& node) const {
-    const auto line = node.source().begin.line;
-    return line > 0 ? fmt::format("{}:{}", file_, line) : file_ + " (--set)";
-  }
-  std::string where() const { return place(table_); }
-  [[noreturn]] void fail(const toml::node& node, const std::string& what) const {
-    throw InputError(place(node) + ": " + what);
-  }
-  [[noreturn]] void missing(const std::string& key, const std::string& what) const {
-    throw InputError(fmt::format("{}: {} needs {} ({})", where(), name_, key, what));
-  }
-  std::string label(const std::string& key) const { return fmt::format("{} in {}", key, name_); }
-
-  double quantity(const toml::node& node, const std::string& what, const Dimension& dimension, Range range,
-                  double bare_unit = 1) {
-    double value = 0;
-    if (node.is_integer() || node.is_floating_point()) {
-      value = bare_unit * *node.value<double>();
-    } else if (const auto text = node.value<std::string>(); text && node.is_string()) {
-      try {
-        value = parse_quantity(*text, dimension);
-      } catch (const InputError& error) {
-        fail(node, fmt::format("{}: {}", what, error.what()));
-      }
-    } else {
-      fail(node,
-           fmt::format("{} must be {} or a string with a unit, not {}", what, expected(dimension), type_name(node)));
-    }
-    if (!std::isfinite(value)) fail(node, fmt::format("{} must be finite", what));
-    if (range == Range::positive && !(value > 0)) fail(node, fmt::format("{} is {}, must be positive", what, value));
-    if (range == Range::nonnegative && value < 0)
-      fail(node, fmt::format("{} is {}, must not be negative", what, value));
-    return value;
-  }
-  std::optional<double> number(const std::string& key, const Dimension& dimension, Range range, double bare_unit = 1) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    return quantity(*node, label(key), dimension, range, bare_unit);
-  }
-  void number(double& target, const std::string& key, const Dimension& dimension, Range range, double bare_unit = 1) {
-    if (const auto value = number(key, dimension, range, bare_unit)) target = *value;
-  }
-  template <int N>
-  std::optional<Eigen::Matrix<double, N, 1>> vector(const std::string& key, const Dimension& dimension,
-                                                    double bare_unit = 1) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    const toml::array* array = node->as_array();
-    if (!array || array->size() != N) {
-      fail(*node, fmt::format("{} must be an array of {} numbers ({})", label(key), N, unit_name(dimension)));
-    }
-    Eigen::Matrix<double, N, 1> result;
-    for (int i = 0; i < N; ++i) {
-      result[i] = quantity((*array)[static_cast<std::size_t>(i)], fmt::format("entry {} of {}", i, label(key)),
-                           dimension, Range::any, bare_unit);
-    }
-    return result;
-  }
-  std::optional<int> integer(const std::string& key, int least, int most) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    return integer(*node, label(key), least, most);
-  }
-  int integer(const toml::node& node, const std::string& what, int least, int most) {
-    const auto value = node.is_integer() ? node.value<std::int64_t>() : std::nullopt;
-    if (!value) fail(node, fmt::format("{} must be a whole number, not {}", what, type_name(node)));
-    if (*value < least || *value > most)
-      fail(node, fmt::format("{} is {}, must be {} to {}", what, *value, least, most));
-    return static_cast<int>(*value);
-  }
-  std::optional<std::array<int, 2>> integers(const std::string& key, int least, int most) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    const toml::array* array = node->as_array();
-    if (!array || array->size() != 2) fail(*node, fmt::format("{} must be two whole numbers [u, v]", label(key)));
-    return std::array<int, 2>{integer((*array)[0], label(key), least, most),
-                              integer((*array)[1], label(key), least, most)};
-  }
-  std::optional<std::string> string(const std::string& key) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    if (!node->is_string()) fail(*node, fmt::format("{} must be a string, not {}", label(key), type_name(*node)));
-    return *node->value<std::string>();
-  }
-  std::optional<bool> boolean(const std::string& key) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    if (!node->is_boolean()) fail(*node, fmt::format("{} must be true or false, not {}", label(key), type_name(*node)));
-    return *node->value<bool>();
-  }
-  // One of `now`; those of `later` are refused with a reason of their own.
-  std::optional<std::string> choice(const std::string& key, const std::vector<std::string>& now,
-                                    const std::vector<std::string>& later) {
-    const auto value = string(key);
-    if (!value) return std::nullopt;
-    const toml::node& node = *table_.get(key);
-    if (std::ranges::find(later, *value) != later.end()) {
-      fail(node, fmt::format("{} = \"{}\" is not supported by this version; use {}", label(key), *value,
-                             fmt::join(now, " or ")));
-    }
-    if (std::ranges::find(now, *value) == now.end()) {
-      fail(node, fmt::format("unknown {} \"{}\"{}", label(key), *value, suggestion(*value, now)));
-    }
-    return value;
-  }
-  std::optional<Table> table(const std::string& key, const std::string& name) {
-    const toml::node* node = find(key);
-    if (!node) return std::nullopt;
-    return as_table(*node, name);
-  }
-  Table as_table(const toml::node& node, const std::string& name) const {
-    if (!node.is_table()) fail(node, fmt::format("{} must be a table, not {}", name, type_name(node)));
-    return Table(*node.as_table(), name, file_);
-  }
-  // The tables of an array of tables.
-  std::vector<Table> tables(const std::string& key, const std::string& name) {
-    const toml::node* node = find(key);
-    if (!node) return {};
-    const toml::array* array = node->as_array();
-    if (!array) fail(*node, fmt::format("{} must be an array of tables: write {}", key, name));
-    std::vector<Table> result;
-    for (const toml::node& entry : *array) result.push_back(as_table(entry, name));
-    return result;
-  }
-  void refuse(const std::string& key, const std::string& why) {
-    const toml::node* node = find(key);
-    known_.pop_back();
-    if (node) fail(*node, why);
-  }
-
-  const toml::table& raw() const { return table_; }
-  void done() const {
-    for (const auto& [key, node] : table_) {
-      const std::string_view name = key.str();
-      if (std::ranges::find(known_, name) != known_.end()) continue;
-      const auto line = key.source().begin.line;
-      const std::string at = line > 0 ? fmt::format("{}:{}", file_, line) : file_ + " (--set)";
-      throw InputError(fmt::format("{}: unknown key '{}' in {}{}", at, name, name_, suggestion(name, known_)));
-    }
-  }
-
- private:
-  static std::string expected(const Dimension& dimension) {
-    return dimension == dimension::none ? "a number" : fmt::format("a number in {}", unit_name(dimension));
-  }
-
-  const toml::table& table_;
-  std::string name_, file_;
-  std::vector<std::string> known_;
-};
 
 std::string stem_of(const std::string& name, std::string_view suffix) {
   return name.substr(0, name.size() - suffix.size());
@@ -263,6 +46,8 @@ void assign(toml::table& root, const std::string& setting) {
   while (!key.empty() && key.back() == ' ') key.pop_back();
   const std::vector<std::string> parts = split_path(key, setting);
   const std::string value = setting.substr(equals + 1);
+  if (parts.size() > deepest_key) throw InputError(fmt::format("--set: a key has more than {} parts", deepest_key));
+  refuse_deep_keys(value, "--set");
   toml::table parsed;
   try {
     parsed = toml::parse("x = " + value);
@@ -312,6 +97,27 @@ void assign(toml::table& root, const std::string& setting) {
       throw InputError(
           fmt::format("--set {}: '{}' is {}, which holds no keys", setting, parts[k - 1], type_name(*node)));
     }
+  }
+}
+
+// Appends every value below a node, and empty tables and arrays, which may mean something.
+void list_keys(const toml::node& node, const std::string& path,
+               std::vector<std::pair<std::string, std::string>>& keys) {
+  const auto below = [&](const auto& key) {
+    return path.empty() ? fmt::format("{}", key) : fmt::format("{}.{}", path, key);
+  };
+  if (const toml::table* table = node.as_table(); table && !table->empty()) {
+    for (const auto& [key, value] : *table) list_keys(value, below(key.str()), keys);
+  } else if (const toml::array* array = node.as_array(); array && !array->empty()) {
+    for (std::size_t k = 0; k < array->size(); ++k) list_keys((*array)[k], below(k), keys);
+  } else if (node.is_string()) {
+    keys.emplace_back(path, fmt::format("\"{}\"", *node.value<std::string>()));
+  } else if (node.is_boolean()) {
+    keys.emplace_back(path, *node.value<bool>() ? "true" : "false");
+  } else if (node.is_number()) {
+    keys.emplace_back(path, fmt::format("{}", *node.value<double>()));
+  } else {
+    keys.emplace_back(path, type_name(node));
   }
 }
 
@@ -593,21 +399,48 @@ void read_output(Table table, Scene& scene) {
 std::string scene_name(const std::filesystem::path& path) {
   const std::string stem = path.stem().string();
   if (stem != "scene") return stem;
-  const std::string folder = std::filesystem::absolute(path).lexically_normal().parent_path().filename().string();
+  std::error_code gone;  // the current directory may be
+  const std::string folder = std::filesystem::absolute(path, gone).lexically_normal().parent_path().filename().string();
   return folder.empty() ? stem : folder;
 }
 
+// "mode": inextensible resists from the first strain on and stays within the tolerance; band lets cloth strain freely to
+// 90 % of the limits, each direction and sign its own.
 void read_limit(Table table, Scene& scene) {
-  const auto mode = table.choice("mode", {"inextensible", "off"}, {"band"});
-  scene.strain_limit.on = !mode || *mode == "inextensible";
-  table.number(scene.strain_limit.tolerance, "tolerance", dimension::none, Range::positive);
+  constexpr double band_slack = 0.9, band_tolerance = 0.01;  // of the limits
+  StrainLimit& limit = scene.strain_limit;
+  const auto mode = table.choice("mode", {"inextensible", "band", "off"}, {});
+  limit.on = !mode || *mode != "off";
+  const bool band = mode && *mode == "band";
+  table.number(limit.tolerance, "tolerance", dimension::none, Range::positive);
+  limit.weft = limit.warp = {limit.tolerance, limit.tolerance};
+  if (band) {
+    const auto stretch = table.vector<2>("stretch", dimension::none), compress = table.vector<2>("compress", dimension::none);
+    if (!stretch && !compress) throw InputError(table.where() + ": mode = \"band\" needs stretch = [weft, warp], compress = [weft, warp], or both");
+    constexpr double free = 0.5;  // C = -1/2 is a thread of no length
+    for (int k : {0, 1}) {
+      StrainBand& b = k == 0 ? limit.weft : limit.warp;
+      b = {stretch ? (*stretch)[k] : 1e3, compress ? (*compress)[k] : free, band_slack};
+      if (!(b.stretch > 0 && b.compress > 0))
+        throw InputError(table.where() + ": stretch and compress are strains above 0 in weft and warp, such as [0.05, 0.02]");
+    }
+    if (!table.find("tolerance"))
+      limit.tolerance = band_tolerance * std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
+  } else {
+    for (const char* key : {"stretch", "compress"}) table.refuse(key, fmt::format("{} belongs to mode = \"band\"", key));
+  }
+  if (table.find("stiffness")) {
+    double stiffness = 0;
+    table.number(stiffness, "stiffness", dimension::force_per_length, Range::positive);
+    limit.stiffness = stiffness;
+  }
+  if (const auto variant = table.choice("variant", {"second-order", "paper"}, {}))
+    limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::second_order;
+  if (band && limit.variant == ProjectionVariant::paper) throw InputError(table.where() + ": variant = \"paper\" has no bands");
   table.choice("solver", {"fast"}, {"lagrange", "springs"});
   table.choice("points", {"knot-mesh"}, {"gauss-2x2", "gauss-1", "cell-average", "greville"});
-  table.number(scene.strain_limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
-  if (const auto n = table.integer("max_iterations", 1, 10000)) scene.strain_limit.max_iterations = *n;
-  for (const char* key : {"stretch", "compress"}) {
-    table.refuse(key, fmt::format("{} belongs to mode = \"band\", which this version does not support", key));
-  }
+  table.number(limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
+  if (const auto n = table.integer("max_iterations", 1, 10000)) limit.max_iterations = *n;
   table.done();
 }
 
@@ -625,6 +458,7 @@ void read_solver(Table table, Scene& scene) {
     }
     scene.until = table.quantity(*node, "until in [solver]", dimension::time, Range::positive);
   }
+  scene.time_limit = table.number("time_limit", dimension::time, Range::positive);
   table.done();
 }
 
@@ -704,6 +538,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   read_settings(top, scene);
   snap_releases(scene);
   top.done();
+  list_keys(root, "", scene.keys);
   return scene;
 }
 
@@ -727,12 +562,7 @@ Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vec
 }
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
-  toml::table root;
-  try {
-    root = toml::parse(text, path.string());
-  } catch (const toml::parse_error& error) {
-    throw InputError(fmt::format("{}:{}: {}", path.string(), error.source().begin.line, error.description()));
-  }
+  toml::table root = parse_toml(text, path);
   return read_tables(root, path, settings);
 }
 
@@ -792,6 +622,13 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
   Table top(root, "the scene", "--set");
   read_settings(top, scene);
   top.done();
+  for (std::size_t k = 0; k < request.pins.size(); ++k) {
+    scene.keys.emplace_back(fmt::format("--pin {}", k), request.pins[k]);
+  }
+  scene.keys.emplace_back("--fabric", request.fabric);
+  if (request.degree) scene.keys.emplace_back("--degree", fmt::format("{}", *request.degree));
+  if (request.span) scene.keys.emplace_back("--span", fmt::format("{} m", *request.span));
+  list_keys(root, "", scene.keys);
   return scene;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "analysis/fabric/fabric.h"
+#include "analysis/projection/fast_projection.h"
 #include "pipeline/addresses.h"
 
 namespace toile {
@@ -87,6 +88,9 @@ struct SceneObstacle {
 struct StrainLimit {
   bool on = false;
   double tolerance = 0.01;
+  StrainBand weft = {}, warp = {}; // "inextensible": both tolerance, without slack
+  std::optional<double> stiffness; // N/m of force per strain before the wall; unset: chosen by the loads
+  ProjectionVariant variant = ProjectionVariant::second_order;
   double regularisation = 1e-3;  // the default of ProjectionOptions
   int max_iterations = 50;
 };
@@ -113,10 +117,12 @@ struct Scene {
   Eigen::Vector3d wind{0, 0, 0};         // m/s
   std::optional<double> dt;              // s; unset: chosen from the eigenvalue bound
   double until = 1;                      // s
+  std::optional<double> time_limit;      // s of wall time for the program; unset: none
   double every = 1.0 / 30;               // s between frames
   std::vector<FrameFormat> formats{FrameFormat::vtu};
   bool preview = true;
   std::vector<OutputPoint> points;
+  std::vector<std::pair<std::string, std::string>> keys;  // as written: "panel.0.grain_deg", "45"
 };
 
 // Reads a scene; `settings` are "key.path=value" with TOML values (a value that isn't TOML is taken as a string) and

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numbers>
 #include <numeric>
 
 #include "analysis/projection/select_rows.h"
@@ -39,14 +41,26 @@ Eigen::Vector3d apply(const ScalarRow& row, const Eigen::VectorXd& q) {
   return y;
 }
 
+// What is held on one side of a seam is held on the other.
+std::vector<int> on_both_sides(const std::vector<int>& control_points, const std::vector<int>& leader) {
+  std::vector<bool> held(leader.size(), false);
+  for (const int i : control_points) held[static_cast<std::size_t>(leader[static_cast<std::size_t>(i)])] = true;
+  std::vector<int> result;
+  for (std::size_t k = 0; k < leader.size(); ++k) {
+    if (held[static_cast<std::size_t>(leader[k])]) result.push_back(static_cast<int>(k));
+  }
+  return result;
+}
+
 struct Candidate {
   ScalarRow row;
   int pin = 0;
   bool required = false;
 };
 
-// Which candidates are independent of those before them and of the fixed control points: Cholesky of the rows' inertia
-// N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one left.
+// Which candidates are independent of those before them and of the fixed control points: sparse Cholesky of the rows'
+// inertia N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one
+// left.
 std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
                               const Eigen::VectorXd& mass) {
   const int n = static_cast<int>(candidates.size());
@@ -59,17 +73,22 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
   }
   rows.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SparseMatrix<double, Eigen::RowMajor> reduced = rows * map.free_part();
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> scaled = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
-  Eigen::MatrixXd dense = Eigen::MatrixXd(scaled);
-  std::vector<bool> taken(static_cast<std::size_t>(n), false);
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> weighted = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> products =
+      weighted * Eigen::SparseMatrix<double>(weighted.transpose());
+  // Row k of the Gram matrix by column; a place meets few others, and so do the rests that the factorisation leaves.
+  std::vector<std::map<int, double>> gram(candidates.size());
   Eigen::VectorXd left(n);
+  // A row that touches fixed control points only holds nothing new.
+  for (int k = 0; k < n; ++k) left[k] = std::sqrt(products.coeff(k, k)) > 1e-9 / std::sqrt(mass.maxCoeff()) ? 1 : 0;
   for (int k = 0; k < n; ++k) {
-    const double norm = dense.row(k).norm();
-    // A row that touches fixed control points only holds nothing new.
-    left[k] = norm > 1e-9 / std::sqrt(mass.maxCoeff()) ? 1 : 0;
-    if (left[k] > 0) dense.row(k) /= norm;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(products, k); it; ++it) {
+      const int l = static_cast<int>(it.col());
+      if (l == k || left[k] == 0 || left[l] == 0) continue;
+      gram[static_cast<std::size_t>(k)][l] = it.value() / std::sqrt(products.coeff(k, k) * products.coeff(l, l));
+    }
   }
-  // Gram-Schmidt on the rows is the Cholesky factorisation of their Gram matrix.
+  std::vector<bool> taken(candidates.size(), false);
   for (bool required : {true, false}) {
     while (true) {
       int best = -1;
@@ -80,11 +99,14 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
       }
       if (best < 0) break;
       taken[static_cast<std::size_t>(best)] = true;
-      const Eigen::RowVectorXd q = dense.row(best).normalized();
-      for (int k = 0; k < n; ++k) {
-        if (taken[static_cast<std::size_t>(k)] || left[k] == 0) continue;
-        dense.row(k) -= dense.row(k).dot(q) * q;
-        left[k] = dense.row(k).squaredNorm();
+      const std::map<int, double> pivot = std::move(gram[static_cast<std::size_t>(best)]);
+      for (const auto& [k, at_k] : pivot) {
+        auto& row = gram[static_cast<std::size_t>(k)];
+        row.erase(best);
+        left[k] -= at_k * at_k / left[best];
+        for (const auto& [l, at_l] : pivot) {
+          if (l != k) row[l] -= at_k * at_l / left[best];
+        }
       }
     }
   }
@@ -92,6 +114,44 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
 }
 
 }  // namespace
+
+// Edge of the square whose corners are as far from its middle as the farthest cloth is [m].
+double extent(const ShellPanel& panel) {
+  Eigen::Matrix3Xd places(3, panel.quadrature.points.size());
+  for (Eigen::Index k = 0; k < places.cols(); ++k) {
+    const Eigen::Vector2d& uv = panel.quadrature.points[static_cast<std::size_t>(k)];
+    places.col(k) = panel.rest(uv.x(), uv.y());
+  }
+  const Eigen::Vector3d middle = places.rowwise().mean();
+  return std::numbers::sqrt2 * (places.colwise() - middle).colwise().norm().maxCoeff();
+}
+
+double limit_stiffness(const Build& build, int panel) {
+  const Scene& scene = build.scene;
+  const StrainLimit& limit = scene.strain_limit;
+  if (limit.stiffness) return *limit.stiffness;
+  constexpr double reserve = 10;
+  const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+  double load = shell.fabric.density * scene.gravity.norm() * extent(shell);
+  for (const SceneTraction& traction : scene.tractions) load = std::max(load, traction.force.norm());
+  const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
+  const double own = std::max(shell.fabric.membrane.weft, shell.fabric.membrane.warp);
+  return reserve * std::max({load / narrowest, own, shell.fabric.density});
+}
+
+// Masses of control points as strain rows weigh them: on closed panels what moves together counts together, so that a seam
+// is as stiff as any other line.
+Eigen::VectorXd row_masses(const Build& build) {
+  Eigen::VectorXd mass = build.model->lumped_mass();
+  const Eigen::VectorXd shared = build.dependence * (build.dependence.transpose() * mass);
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    if (!build.panels[k].closure.any()) continue;
+    const int first = build.model->first_control_point(static_cast<int>(k));
+    const Eigen::Index count = build.rest(static_cast<int>(k)).points().cols();
+    mass.segment(first, count) = shared.segment(first, count);
+  }
+  return mass;
+}
 
 std::unique_ptr<System> assemble(const Build& build, double t) {
   const Scene& scene = build.scene;
@@ -115,11 +175,25 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     const PanelPlaces places{panel.name, panel.face, panel.topology, build.rest(k), start, panel.carries_cloth};
     const HeldPlace place = held_place(pin.at, pin.clamp, places, who);
     int points = 0;
-    for (const int i : place.control_points) {
-      held.push_back({build.model->first_control_point(k) + i, static_cast<int>(p)});
+    const auto count = [&](int i) {
       mean[p] += start.col(i);
       ++points;
+    };
+    std::vector<int> followers;
+    for (const int i : on_both_sides(place.control_points, panel.leader)) {
+      const bool leads = panel.leader[static_cast<std::size_t>(i)] == i;
+      if (panel.smooth_seams.follows(build.rest(k), i)) {
+        if (leads) followers.push_back(i);
+        continue;
+      }
+      held.push_back({build.model->first_control_point(k) + i, static_cast<int>(p)});
+      if (leads) count(i);  // a seam's place counts once
     }
+    // Fixed by itself a point of a smooth seam would no longer follow its neighbours, and the seam could fold there.
+    for (const int i : followers) {
+      candidates.push_back({{{build.model->first_control_point(k) + i}, {1.0}}, static_cast<int>(p), true});
+    }
+    if (points == 0) std::ranges::for_each(followers, count);
     for (const Eigen::Vector2d& uv : place.points) {
       candidates.push_back({row_at(build, k, uv), static_cast<int>(p), place.every_point});
       mean[p] += apply(candidates.back().row, build.start);
@@ -186,17 +260,27 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     system->points.push_back(panel.points);
     system->points.back().insert(system->points.back().end(), panel.extra_points.begin(), panel.extra_points.end());
   }
-  if (scene.strain_limit.on) {
-    rows.strain = select_rows(*build.model, *system->map, dynamic.node_mass, system->points, rows.place);
+  const StrainLimit& limit = scene.strain_limit;
+  if (limit.on) {
+    const Eigen::VectorXd mass = row_masses(build).cwiseMax(build.mass_floor);
+    rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
+    if (limit.variant == ProjectionVariant::second_order) {
+      std::vector<double> stiffness;
+      for (std::size_t k = 0; k < build.panels.size(); ++k) stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
+      for (StrainRow& row : rows.strain) row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
+    }
   }
   for (std::size_t k = 0; k < build.panels.size(); ++k) system->points[k].resize(build.panels[k].points.size());
   system->strain_rows = static_cast<int>(rows.strain.size());
   system->place_rows = static_cast<int>(rows.place.size());
   if (!rows.strain.empty() || !rows.place.empty()) {
     ProjectionOptions options;
-    options.tolerance = scene.strain_limit.tolerance;
-    options.regularisation = scene.strain_limit.regularisation;
-    options.max_iterations = scene.strain_limit.max_iterations;
+    options.variant = limit.variant;
+    options.weft = limit.weft;
+    options.warp = limit.warp;
+    options.tolerance = limit.tolerance;
+    options.regularisation = limit.regularisation;
+    options.max_iterations = limit.max_iterations;
     system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
   }
   dynamic.projection = system->projection.get();

@@ -24,6 +24,10 @@ struct System {
   DynamicSystem dynamic;
 };
 
+// Stiffness of the strain limit of a panel [N/m]: the scene's, else one that strains by a tenth of the narrowest limit
+// under the panel's whole weight or the largest traction, and is at least ten times the fabric's own.
+double limit_stiffness(const Build& build, int panel);
+
 // Pins released at or before t are left out. Throws InputError where two pins hold one control point and move apart,
 // GeometryError for places that don't exist, SolverError where place rows contradict each other.
 std::unique_ptr<System> assemble(const Build& build, double t);

@@ -68,12 +68,13 @@ std::pair<Piece, Piece> halves(const Piece& piece) {
   return {left, right};
 }
 
-// Every leg of the control polygon goes forward along the chord: the piece can't meet itself.
+// No leg of the control polygon goes back along the chord: every line across it meets the piece at most once, so the
+// piece can't meet itself.
 bool forward(const Piece& piece) {
   const Vector2d chord = piece.last() - piece.first();
+  if (chord == Vector2d::Zero()) return false;
   for (int i = 0; i < piece.degree(); ++i) {
-    const Vector2d leg = piece.span.point(i + 1) - piece.span.point(i);
-    if (leg != Vector2d::Zero() && !(leg.dot(chord) > 0)) return false;
+    if (!((piece.span.point(i + 1) - piece.span.point(i)).dot(chord) >= 0)) return false;
   }
   return true;
 }
@@ -213,7 +214,7 @@ class Finder {
   }
 
   bool near_known_contact(const Piece& a, const Piece& b) const {
-    const auto near = [this](const Piece& piece, const Vector2d& x) {
+    const auto near = [](const Piece& piece, const Vector2d& x) {
       return (piece.box.min - x).cwiseAbs().maxCoeff() <= cluster_ &&
              (piece.box.max - x).cwiseAbs().maxCoeff() <= cluster_;
     };
@@ -320,8 +321,9 @@ class Finder {
     const TrimSpan& span_b = chain(b)[static_cast<std::size_t>(b.link)];
     const double size = std::min((span_a.last() - span_a.first()).norm(), (span_b.last() - span_b.first()).norm());
     const double radius = std::max(1e-4 * size, 1e3 * smallest_);
-    const double a_in = branch(a, uv, radius, false), a_out = branch(a, uv, radius, true);
-    const double b_in = branch(b, uv, radius, false), b_out = branch(b, uv, radius, true);
+    const double s_a = parameter(a, uv), s_b = parameter(b, uv);
+    const double a_in = branch(a, s_a, uv, radius, false), a_out = branch(a, s_a, uv, radius, true);
+    const double b_in = branch(b, s_b, uv, radius, false), b_out = branch(b, s_b, uv, radius, true);
     const auto turn = [](double from, double to) {
       const double x = std::fmod(to - from, 2 * std::numbers::pi);
       return x < 0 ? x + 2 * std::numbers::pi : x;
@@ -337,11 +339,22 @@ class Finder {
 
   const std::vector<TrimSpan>& chain(const Piece& p) const { return chains_[static_cast<std::size_t>(p.loop)]; }
 
-  // Direction [rad] from x to where the loop is `radius` away from it, after or before the piece.
-  double branch(const Piece& p, const Vector2d& x, double radius, bool after) const {
+  // Where the contact x lies on the span of a piece: a straight one may be long, any other is as small as the contact.
+  static double parameter(const Piece& p, const Vector2d& x) {
+    if (!p.straight()) return 0.5 * (p.s0 + p.s1);
+    if (x == p.first()) return p.s0;
+    if (x == p.last()) return p.s1;
+    const Vector2d d = p.last() - p.first();
+    const double share = std::clamp((x - p.first()).dot(d) / d.squaredNorm(), 0.0, 1.0);
+    // The weights of the ends move the parameter of a point at that share of the length.
+    const double from = (1 - share) * p.span.w[1], to = share * p.span.w[0];
+    return p.s0 + (p.s1 - p.s0) * to / (from + to);
+  }
+
+  // Direction [rad] from x to where the loop is `radius` away from it, after or before parameter s of the piece's span.
+  double branch(const Piece& p, double s, const Vector2d& x, double radius, bool after) const {
     const std::vector<TrimSpan>& links = chain(p);
     std::size_t link = static_cast<std::size_t>(p.link);
-    double s = 0.5 * (p.s0 + p.s1);
     for (std::size_t step = 0; step <= links.size(); ++step) {
       // Steps that double find the first way out, also where the span comes back to x.
       const double end = after ? 1 : 0;

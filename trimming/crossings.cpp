@@ -322,7 +322,7 @@ void narrow(const LineForm& form, LineRoot& root, PredicateCounts& counts) {
     root.lo = root.hi = r;
     return;
   }
-  for (double delta = 4 * epsilon; delta < 1e-3; delta *= 4) {
+  for (double delta = 4 * epsilon; delta < 1e-10; delta *= 4) {
     const double a = std::max(root.lo, r - delta), b = std::min(root.hi, r + delta);
     if (a < b && filtered_sign(form, a) == before && filtered_sign(form, b) == -before) {
       root.lo = a;
@@ -330,7 +330,7 @@ void narrow(const LineForm& form, LineRoot& root, PredicateCounts& counts) {
       return;
     }
   }
-  // An ill-conditioned root, or one beside a root at an end of the span.
+  // An ill-conditioned root, or one beside a root at an end of the span: signs are exact from here on.
   while (!root.exact() && (sign_at(form, root.lo, counts) == 0 || sign_at(form, root.hi, counts) == 0 ||
                            root.hi - root.lo > 4 * epsilon)) {
     const double mid = root.s();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "geometry/error.h"
 #include "geometry/refine.h"
@@ -26,11 +27,7 @@ class Validator {
   }
 
   std::vector<LoopRepair> run() {
-    const auto outer = std::count_if(surface_.loops.begin(), surface_.loops.end(),
-                                     [](const TrimLoop& loop) { return loop.kind == LoopKind::outer; });
-    if (outer != 1) {
-      throw GeometryError(place_name(surface_) + ": has " + std::to_string(outer) + " outer loops, needs exactly one");
-    }
+    check_outer_loops();
     for (TrimLoop& loop : surface_.loops) {
       prepare(loop);
       chain(loop);
@@ -68,6 +65,19 @@ class Validator {
   }
   bool within_tolerance(const Vector2d& a, const Vector2d& b) const {
     return ((a - b).cwiseAbs().array() <= tolerance_.array()).all();
+  }
+
+  void check_outer_loops() const {
+    std::vector<const TrimLoop*> outer;
+    for (const TrimLoop& loop : surface_.loops) {
+      if (loop.kind == LoopKind::outer) outer.push_back(&loop);
+    }
+    if (outer.empty()) throw GeometryError(place_name(surface_) + ": has no outer loop, needs exactly one");
+    if (outer.size() == 1) return;
+    const TrimLoop& second = *outer[1];
+    throw GeometryError(place_name(surface_, second) + ": a second outer loop, beside loop " +
+                        std::to_string(outer[0]->index) + "; make a face of each" +
+                        (second.curves.empty() ? "" : " (at " + point_text(start(second.curves.front())) + ")"));
   }
 
   // Ends that are control points; no curve that is a point.
@@ -242,6 +252,10 @@ class Validator {
               : " loop " + std::to_string(b.index) + ", curve " + std::to_string(curve_b.index) + ",";
       if (contact.kind == ContactKind::crossing) fail(a, &curve_a, "crosses" + other, contact.uv);
       if (contact.kind == ContactKind::overlap) fail(a, &curve_a, "runs along" + other, contact.uv);
+      if (contact.loop_a != contact.loop_b) {
+        check_sides(contact.loop_a, contact.loop_b, contact.uv);
+        check_sides(contact.loop_b, contact.loop_a, contact.uv);
+      }
       report(a, "curve " + std::to_string(curve_a.index) + " touches" + other, 0, contact.uv);
     }
   }
@@ -281,13 +295,37 @@ class Validator {
     throw GeometryError(place_name(surface_, loop) + ": encloses nothing");
   }
 
-  // Side of a loop that doesn't cross `other`: by an end point of its spans that isn't on `other`.
+  // A loop that only touches `other` has all its span ends, which are exact points of it, on one side or on `other`.
+  // How branches leave a contact is read from rounded points; this is not.
+  void check_sides(int l, int other, const Vector2d& contact) {
+    std::optional<bool> within;
+    for (const TrimSpan& span : spans_.of(l)) {
+      const auto n = winding(other, span.first());
+      if (!n) continue;
+      const bool in = *n != 0;
+      if (within.value_or(in) != in) {
+        const TrimLoop& loop = surface_.loops[static_cast<std::size_t>(l)];
+        fail(loop, &loop.curves[static_cast<std::size_t>(span.curve)],
+             "crosses loop " + std::to_string(surface_.loops[static_cast<std::size_t>(other)].index), contact);
+      }
+      within = in;
+    }
+  }
+
+  // Side of a loop that doesn't cross `other`: by an end point of its spans that isn't on `other`, else by a point
+  // between whose rounding (8 eps of its coordinates at most) doesn't matter.
   int winding_of_loop(int l, int other) {
     for (const TrimSpan& span : spans_.of(l)) {
       if (const auto n = winding(other, span.first())) return *n;
     }
     for (const TrimSpan& span : spans_.of(l)) {
-      if (const auto n = winding(other, span.at(0.5))) return *n;
+      for (const double s : {0.5, 0.25, 0.75}) {
+        const Vector2d x = span.at(s), d = 8 * std::numeric_limits<double>::epsilon() * x.cwiseAbs();
+        const auto n = winding(other, x + d);
+        if (n && n == winding(other, x - d) && n == winding(other, x + Vector2d(d.x(), -d.y())) &&
+            n == winding(other, x + Vector2d(-d.x(), d.y())))
+          return *n;
+      }
     }
     return 0;
   }

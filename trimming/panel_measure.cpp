@@ -57,13 +57,15 @@ double cut_area(const NurbsSurface& surface, const CellBoundary& boundary, const
       legendre[k + n * q] = ((2 * k - 1) * rule.x[q] * legendre[k - 1 + n * q] - (k - 1) * legendre[k - 2 + n * q]) / k;
   }
   // Sum over a, b of coefficient (a, b) times moment (a, b), gathered per node: the weight that the material gives it.
+  std::vector<Real> along(n * n, 0);  // summed over a: b + n q
+  for (int q = 0; q < n; ++q)
+    for (int b = 0; b < n; ++b)
+      for (int a = 0; a < n; ++a) along[b + n * q] += Real(2 * a + 1) / 2 * legendre[a + n * q] * moments[a + n * b];
   double area = 0;
   for (int r = 0; r < n; ++r)
     for (int q = 0; q < n; ++q) {
       Real share = 0;
-      for (int b = 0; b < n; ++b)
-        for (int a = 0; a < n; ++a)
-          share += Real(2 * a + 1) * (2 * b + 1) / 4 * legendre[a + n * q] * legendre[b + n * r] * moments[a + n * b];
+      for (int b = 0; b < n; ++b) share += Real(2 * b + 1) / 2 * legendre[b + n * r] * along[b + n * q];
       const auto u = static_cast<double>(boundary.origin.x() + box.centre_x + box.half_x * rule.node[q]);
       const auto v = static_cast<double>(boundary.origin.y() + box.centre_y + box.half_y * rule.node[r]);
       area += rule.w[q] * rule.w[r] * static_cast<double>(share) *

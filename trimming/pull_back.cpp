@@ -35,6 +35,7 @@ class Puller {
     snap_ = std::max(options.snap, tolerance_);
     closed_ = closed_directions(s_, std::max(snap_, 1e-9 * size_));
     start_ = options.start;
+    max_distance_ = options.max_distance;
   }
 
   PulledCurve run() {
@@ -46,7 +47,7 @@ class Puller {
       out.distance = p.distance;
       out.place = model_(p.t);
     }
-    if (out.distance > 0.1 * size_) {
+    if (!(out.distance <= max_distance_ * size_)) {
       throw GeometryError("a model curve leaves its surface by " + text(out.distance) + " at (" + text(out.place.x()) +
                           ", " + text(out.place.y()) + ", " + text(out.place.z()) + ")");
     }
@@ -62,7 +63,7 @@ class Puller {
       path.push_back({{breaks[i], breaks[i + 1]}, [this, span](double t) { return path_point(span, t); }});
     }
     CubicFitOptions<2> fit;
-    fit.tolerance = tolerance_;
+    fit.tolerance = std::max(tolerance_, 0.01 * out.distance);
     fit.max_halvings = 10;
     fit.distance = [this](double, const Vector2d& path_uv, const Vector2d& uv) {
       return length(path_uv, uv - path_uv);
@@ -255,9 +256,15 @@ class Puller {
     Eigen::Matrix<double, 3, 2> map;
     map << j.u, j.v;
     const Vector3d d = evaluate_on_span(model_, span, t).d1;
+    // The derivative of the condition that the rest stands upright on the surface.
+    const Vector3d rest = model_(t) - j.x;
+    Eigen::Matrix2d bending;
+    bending << rest.dot(j.uu), rest.dot(j.uv), rest.dot(j.uv), rest.dot(j.vv);
     Eigen::Matrix2d normal = map.transpose() * map;
+    if ((normal - bending).determinant() > 0.1 * normal.determinant()) normal -= bending;
     normal.diagonal().array() += 1e-14 * normal.trace();  // collapsed edges
     Vector2d rate = normal.ldlt().solve(map.transpose() * d);
+    if (!rate.allFinite()) rate.setZero();
     for (int k = 0; k < 2; ++k)
       if (constant_[static_cast<std::size_t>(k)]) rate[k] = 0;
     return {at.uv, rate};
@@ -267,7 +274,7 @@ class Puller {
   const Curve3& model_;
   std::array<Interval, 2> domain_;
   std::array<bool, 2> closed_{};
-  double size_ = 0, tolerance_ = 0, snap_ = 0;
+  double size_ = 0, tolerance_ = 0, snap_ = 0, max_distance_ = 0;
   std::optional<Vector2d> start_;
   std::vector<Place> places_;
   std::array<std::optional<double>, 2> constant_{};

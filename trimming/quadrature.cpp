@@ -193,10 +193,11 @@ class CutCellRule {
   std::vector<Monotone> monotone_;
   std::vector<double> heights_, roots_;
   std::vector<Crossing> crossings_;
-  std::vector<double> x_, y_, w_;  // candidates; weights over the area
-  RowMajor phi_;                   // functions x candidates
-  RowMajor table_;                 // the same in terms of the basis points
-  std::vector<int> basis_;         // candidate of each row, -1: none
+  // Candidates; weights over the area. Eigen sums in an order that depends on the alignment, so it is fixed.
+  std::vector<double, Eigen::aligned_allocator<double>> x_, y_, w_;
+  RowMajor phi_;            // functions x candidates
+  RowMajor table_;          // the same in terms of the basis points
+  std::vector<int> basis_;  // candidate of each row, -1: none
   std::vector<char> in_basis_;
   Eigen::VectorXd error_;
 };

@@ -125,11 +125,13 @@ std::vector<TrimSpan> trim_spans(const Curve2& curve, int loop, int curve_positi
     for (int k = 0; k <= p; ++k) {
       const std::size_t at = static_cast<std::size_t>(k);
       const int c = i - p + k;
-      if (given) {
+      // At a knot of multiplicity p the curve passes its control point.
+      const bool at_point = (k == 0 && knots[i - p + 1] == knots[i]) || (k == p && knots[i + p] == knots[i + 1]);
+      if (given || at_point) {
         span.u[at] = curve.points()(0, c);
         span.v[at] = curve.points()(1, c);
         span.w[at] = rational ? curve.weight(c) : 1.0;
-      } else if (k == 0 && !spans.empty() && knots[i - p] != knots[i]) {
+      } else if (k == 0 && !spans.empty()) {
         const std::size_t end = static_cast<std::size_t>(p);
         span.u[at] = spans.back().u[end];
         span.v[at] = spans.back().v[end];

@@ -6,343 +6,456 @@
 #include <CGAL/Triangulation_face_base_with_info_2.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <deque>
+#include <numbers>
 
-#include "trimming/cell_boundary.h"
+#include "geometry/error.h"
+#include "trimming/text.h"
 
-// Cells meet only along knot lines, so the mesh conforms where both sides of a cell edge carry the same points: the
-// grid points of the edge and every vertex of a trim polygon that lies on it. These are collected first; then each cell
-// is triangulated by itself.
 namespace toile {
 namespace {
 
-using Real = BoundaryBezier::Real;
+using Eigen::Matrix2d;
 using Eigen::Vector2d;
+using Eigen::Vector3d;
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<int, Kernel>;
-using FaceBase =
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<int, Kernel>;  // into TrimmedTriangles::uv
+using FaceBase =                                                              // nesting depth: odd in the material
     CGAL::Constrained_triangulation_face_base_2<Kernel, CGAL::Triangulation_face_base_with_info_2<int, Kernel>>;
 using Delaunay =
     CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>,
                                                CGAL::Exact_predicates_tag>;
 
-using Polygon = std::vector<Vector2d>;
+constexpr double most_triangles = 4e6;
 
-// k-th of n + 1 equal steps, the ends bitwise.
-double grid(double a, double b, int k, int n) {
-  return k == 0 ? a : k == n ? b : a + (b - a) * k / n;
-}
-
-struct Cell {
-  Interval u, v;
-  int i = 0, j = 0;
+// The boundary between two neighbouring vertices: one curve over [t0, t1], in the loop's direction.
+struct Segment {
+  int loop = 0, curve = 0;
+  double t0 = 0, t1 = 0;
+  Vector2d from{0, 0};
+  bool given = false;  // between given points: not to be divided
 };
-Cell cell_at(const KnotMesh& mesh, int i, int j) {
-  return {{mesh.u[i], mesh.u[i + 1]}, {mesh.v[j], mesh.v[j + 1]}, i, j};
-}
 
-// Largest distance of the control points from the chord, in units of the cell.
-double sagitta(const BoundaryBezier& piece, const Cell& cell) {
-  const auto point = [&](int k) {
-    return Vector2d(static_cast<double>(piece.x[k] / piece.w[k]) / cell.u.length(),
-                    static_cast<double>(piece.y[k] / piece.w[k]) / cell.v.length());
-  };
-  const Vector2d a = point(0), chord = point(piece.degree) - a;
-  const double length_squared = chord.squaredNorm();
-  double largest = 0;
-  for (int k = 1; k < piece.degree; ++k) {
-    const Vector2d p = point(k) - a;
-    const double along = length_squared > 0 ? std::clamp(p.dot(chord) / length_squared, 0.0, 1.0) : 0;
-    largest = std::max(largest, (p - along * chord).norm());
-  }
-  return largest;
-}
-
-// De Casteljau at 1/2: the piece becomes its first half, the second is returned.
-BoundaryBezier split(BoundaryBezier& piece) {
-  BoundaryBezier right = piece;
-  const int d = piece.degree;
-  for (auto values : {&BoundaryBezier::x, &BoundaryBezier::y, &BoundaryBezier::w}) {
-    auto c = piece.*values;
-    for (int r = 0; r <= d; ++r) {
-      (piece.*values)[r] = c[0];
-      (right.*values)[d - r] = c[d - r];
-      for (int j = 0; j < d - r; ++j) c[j] = (c[j] + c[j + 1]) / 2;
-    }
-  }
-  return right;
-}
-
-// Points strictly between the ends of a piece, in order.
-void flatten(BoundaryBezier piece, const Cell& cell, const Vector2d& origin, double chord, int depth, Polygon& out) {
-  if (depth == 0 || sagitta(piece, cell) <= chord) return;
-  const BoundaryBezier right = split(piece);
-  flatten(piece, cell, origin, chord, depth - 1, out);
-  const auto u = static_cast<double>(origin.x() + right.x[0] / right.w[0]);
-  const auto v = static_cast<double>(origin.y() + right.y[0] / right.w[0]);
-  out.emplace_back(std::clamp(u, cell.u.min, cell.u.max), std::clamp(v, cell.v.min, cell.v.max));
-  flatten(right, cell, origin, chord, depth - 1, out);
-}
-
-std::vector<Polygon> polygons_of(const TrimmedSurface& surface, const CutCell& cut, const Cell& cell, double chord) {
-  std::vector<Polygon> polygons;
-  std::vector<BoundaryBezier> pieces;
-  for (const auto& loop : cut.loops) {
-    Polygon polygon;
-    const auto add = [&](const Vector2d& p) {
-      if (polygon.empty() || polygon.back() != p) polygon.push_back(p);
-    };
-    for (const BoundaryPiece& piece : loop) {
-      add(piece.from);
-      if (piece.curve < 0) continue;
-      pieces.clear();
-      append_pieces(surface, piece, piece.from, pieces);
-      for (std::size_t k = 0; k < pieces.size(); ++k) {
-        Polygon inner;
-        if (k > 0)
-          inner.emplace_back(
-              std::clamp(static_cast<double>(piece.from.x() + pieces[k].x[0] / pieces[k].w[0]), cell.u.min, cell.u.max),
-              std::clamp(static_cast<double>(piece.from.y() + pieces[k].y[0] / pieces[k].w[0]), cell.v.min,
-                         cell.v.max));
-        flatten(pieces[k], cell, piece.from, chord, 24, inner);
-        for (const Vector2d& p : inner) add(p);
-      }
-    }
-    while (polygon.size() > 1 && polygon.front() == polygon.back()) polygon.pop_back();
-    if (polygon.size() > 2) polygons.push_back(std::move(polygon));
-  }
-  return polygons;
-}
-
-// The points on each cell edge besides its ends, ascending.
-class EdgePoints {
+class Mesher {
  public:
-  EdgePoints(const KnotMesh& mesh, int per_cell)
-      : mesh_(mesh),
-        per_cell_(per_cell),
-        upright_(mesh.u.size() * static_cast<std::size_t>(mesh.cells_v())),
-        level_(mesh.v.size() * static_cast<std::size_t>(mesh.cells_u())) {}
-
-  void add(const Cell& cell, const Vector2d& p) {
-    for (int side = 0; side < 2; ++side) {
-      if (p.x() == mesh_.u[cell.i + side]) insert(upright(cell.i + side, cell.j), p.y(), cell.v);
-      if (p.y() == mesh_.v[cell.j + side]) insert(level(cell.i, cell.j + side), p.x(), cell.u);
+  Mesher(const TrimmedSurface& surface, const TrimTopology& topology, const TriangulationOptions& options)
+      : surface_(surface), options_(options) {
+    roll_out(topology);
+    if (options.size) size_ = *options.size;
+    if (!(size_ > 0) || !std::isfinite(size_))
+      throw GeometryError(place_name(surface) + ": a triangle size of " + text(size_) + ", must be positive");
+    if (!(options.chord > 0))
+      throw GeometryError(place_name(surface) + ": a chord of " + text(options.chord) + ", must be positive");
+    for (const GivenPoints& g : options.given) {
+      if (g.loop < 0 || g.loop >= static_cast<int>(surface.loops.size()) || g.curve < 0 ||
+          g.curve >= static_cast<int>(surface.loops[static_cast<std::size_t>(g.loop)].curves.size()))
+        throw GeometryError(place_name(surface) + ": points are given for loop " + std::to_string(g.loop) + ", curve " +
+                            std::to_string(g.curve) + ", which isn't there");
     }
+    const double expected = area_ / (size_ * size_ * std::sqrt(3.0) / 4);
+    if (!(expected < most_triangles))
+      throw GeometryError(place_name(surface) + ": triangles of size " + text(size_) + " would be " + text(expected));
+    for (std::size_t l = 0; l < surface.loops.size(); ++l) divide_loop(static_cast<int>(l));
   }
 
-  bool empty(const Cell& cell) const {
-    return upright_[at_upright(cell.i, cell.j)].empty() && upright_[at_upright(cell.i + 1, cell.j)].empty() &&
-           level_[at_level(cell.i, cell.j)].empty() && level_[at_level(cell.i, cell.j + 1)].empty();
-  }
-
-  // The polygon with every side that runs along a cell edge divided at the edge's points.
-  Polygon refined(const Cell& cell, const Polygon& polygon) const {
-    Polygon out;
-    for (std::size_t k = 0; k < polygon.size(); ++k) {
-      const Vector2d &p = polygon[k], &q = polygon[(k + 1) % polygon.size()];
-      out.push_back(p);
-      for (int side = 0; side < 2; ++side) {
-        if (p.x() == mesh_.u[cell.i + side] && q.x() == p.x())
-          for (const double v : between(upright_[at_upright(cell.i + side, cell.j)], cell.v, p.y(), q.y()))
-            out.emplace_back(p.x(), v);
-        if (p.y() == mesh_.v[cell.j + side] && q.y() == p.y())
-          for (const double u : between(level_[at_level(cell.i, cell.j + side)], cell.u, p.x(), q.x()))
-            out.emplace_back(u, p.y());
-      }
+  TrimmedTriangles run() {
+    // Chords of thin material may cross each other: divided until they don't. Material thinner than 2^-12 of an edge
+    // keeps its crossings, as vertices where they meet.
+    constexpr int rounds = 12;
+    for (int round = 0; !constrain(round == rounds); ++round) {
     }
-    return out;
+    mark_depths();
+    refine();
+    collect();
+    return std::move(out_);
   }
 
  private:
-  std::size_t at_upright(int line, int j) const { return static_cast<std::size_t>(line) + mesh_.u.size() * j; }
-  std::size_t at_level(int i, int line) const {
-    return static_cast<std::size_t>(i) + static_cast<std::size_t>(mesh_.cells_u()) * line;
+  // The affine map with the mean metric of the panel, the area and the mean size of a cell.
+  void roll_out(const TrimTopology& topology) {
+    const KnotMesh& mesh = topology.mesh;
+    Eigen::Vector3d metric(0, 0, 0);
+    int cells = 0;
+    for (int j = 0; j < mesh.cells_v(); ++j) {
+      for (int i = 0; i < mesh.cells_u(); ++i) {
+        if (topology.cells[static_cast<std::size_t>(mesh.cell(i, j))] == CellKind::outside) continue;
+        const double u0 = mesh.u[static_cast<std::size_t>(i)], u1 = mesh.u[static_cast<std::size_t>(i) + 1],
+                     v0 = mesh.v[static_cast<std::size_t>(j)], v1 = mesh.v[static_cast<std::size_t>(j) + 1];
+        const SurfaceJet jet = evaluate(surface_.surface, u0 + (u1 - u0) / 2, v0 + (v1 - v0) / 2);
+        metric += Eigen::Vector3d(jet.u.dot(jet.u), jet.u.dot(jet.v), jet.v.dot(jet.v));
+        area_ += jet.u.cross(jet.v).norm() * (u1 - u0) * (v1 - v0);
+        ++cells;
+      }
+    }
+    if (cells == 0 || !(area_ > 0)) throw GeometryError(place_name(surface_) + ": has no area to triangulate");
+    metric /= cells;
+    const double a = std::sqrt(metric[0]), b = metric[1] / a,
+                 c = std::sqrt(std::max(metric[2] - b * b, 1e-12 * metric[2]));
+    plane_ << a, b, 0, c;
+    back_ = plane_.inverse();
+    size_ = std::sqrt(area_ / cells) / 4;
   }
-  std::vector<double>& upright(int line, int j) { return upright_[at_upright(line, j)]; }
-  std::vector<double>& level(int i, int line) { return level_[at_level(i, line)]; }
 
-  void insert(std::vector<double>& points, double x, Interval range) const {
-    if (!(range.min < x && x < range.max)) return;
-    for (int k = 1; k < per_cell_; ++k)
-      if (x == grid(range.min, range.max, k, per_cell_)) return;
-    const auto place = std::lower_bound(points.begin(), points.end(), x);
-    if (place == points.end() || *place != x) points.insert(place, x);
+  const Curve2& curve(int l, int c) const {
+    return surface_.loops[static_cast<std::size_t>(l)].curves[static_cast<std::size_t>(c)].curve;
+  }
+  Vector3d position(const Vector2d& uv) const { return surface_.surface(uv.x(), uv.y()); }
+
+  // The curve at t, its ends the control points that its neighbours share bitwise.
+  Vector2d on_curve(int l, int c, double t) const {
+    const Curve2& x = curve(l, c);
+    if (t == x.domain().min) return x.points().col(0);
+    if (t == x.domain().max) return x.points().col(x.points().cols() - 1);
+    const Interval u = surface_.surface.u().domain(), v = surface_.surface.v().domain();
+    const Vector2d uv = x(t);
+    return {std::clamp(uv.x(), u.min, u.max), std::clamp(uv.y(), v.min, v.max)};
   }
 
-  std::vector<double> between(const std::vector<double>& points, Interval range, double a, double b) const {
+  double speed(const Curve2& c, double t) const {
+    const CurveJet<2> at = evaluate(c, t);
+    const SurfaceJet jet = evaluate(surface_.surface, at.x.x(), at.x.y());
+    return (jet.u * at.d1.x() + jet.v * at.d1.y()).norm();
+  }
+
+  // Parameters between t0 and t1 that part the curve into lengths of at most the size, nearly equal.
+  std::vector<double> equal_parts(const Curve2& c, double t0, double t1) const {
+    std::vector<double> stops{t0};
+    for (const double k : c.knots().breaks())
+      if (t0 < k && k < t1) stops.push_back(k);
+    stops.push_back(t1);
+    constexpr int steps = 16;  // per span, by Simpson's rule
+    std::vector<double> t{t0}, length{0};
+    for (std::size_t s = 0; s + 1 < stops.size(); ++s) {
+      const double h = (stops[s + 1] - stops[s]) / steps;
+      for (int k = 0; k < steps; ++k) {
+        const double a = stops[s] + k * h;
+        t.push_back(k + 1 == steps ? stops[s + 1] : a + h);
+        length.push_back(length.back() + h / 6 * (speed(c, a) + 4 * speed(c, a + h / 2) + speed(c, a + h)));
+      }
+    }
+    const double parts = std::max(1.0, std::ceil(length.back() / size_ - 1e-9));
+    if (!(parts < most_triangles))
+      throw GeometryError(place_name(surface_) + ": its boundary has no size to triangulate");
     std::vector<double> out;
-    const double low = std::min(a, b), high = std::max(a, b);
-    for (const double x : points)
-      if (low < x && x < high) out.push_back(x);
-    for (int k = 1; k < per_cell_; ++k)
-      if (const double x = grid(range.min, range.max, k, per_cell_); low < x && x < high) out.push_back(x);
-    std::sort(out.begin(), out.end());
-    if (a > b) std::reverse(out.begin(), out.end());
+    std::size_t at = 0;
+    for (double k = 1; k < parts; ++k) {
+      const double x = length.back() * k / parts;
+      while (at + 2 < t.size() && length[at + 1] < x) ++at;
+      const double step = length[at + 1] - length[at];
+      const double place = t[at] + (t[at + 1] - t[at]) * (step > 0 ? (x - length[at]) / step : 0.5);
+      if (place > (out.empty() ? t0 : out.back()) && place < t1) out.push_back(place);
+    }
     return out;
   }
 
-  const KnotMesh& mesh_;
-  int per_cell_;
-  std::vector<std::vector<double>> upright_, level_;
-};
-
-// Collects vertices, each place once.
-class Mesh {
- public:
-  int vertex(const Vector2d& p) {
-    const auto [place, fresh] = index_.try_emplace({p.x() + 0.0, p.y() + 0.0}, static_cast<int>(out_.uv.size()));
-    if (fresh) out_.uv.push_back(p);
-    return place->second;
+  void divide_loop(int l) {
+    const TrimLoop& loop = surface_.loops[static_cast<std::size_t>(l)];
+    std::vector<Segment>& ring = rings_.emplace_back();
+    for (std::size_t k = 0; k < loop.curves.size(); ++k) {
+      const int c = static_cast<int>(k);
+      const Curve2& x = loop.curves[k].curve;
+      const Interval domain = x.domain();
+      std::vector<double> t{domain.min};
+      const auto given = std::find_if(options_.given.begin(), options_.given.end(),
+                                      [&](const GivenPoints& g) { return g.loop == l && g.curve == c; });
+      const bool free = given == options_.given.end();
+      if (free) {
+        // Kinks are vertices.
+        std::vector<double> kinks;
+        for (const double knot : x.knots().breaks())
+          if (domain.min < knot && knot <= domain.max &&
+              (knot == domain.max || x.knots().multiplicity(knot) >= x.degree()))
+            kinks.push_back(knot);
+        for (const double kink : kinks) {
+          const std::vector<double> between = equal_parts(x, t.back(), kink);
+          t.insert(t.end(), between.begin(), between.end());
+          t.push_back(kink);
+        }
+      } else {
+        for (const double inner : given->t) {
+          if (!(t.back() < inner && inner < domain.max))
+            throw GeometryError(place_name(surface_, loop, &loop.curves[k]) + ": given point t = " + text(inner) +
+                                " is not between " + text(t.back()) + " and " + text(domain.max));
+          t.push_back(inner);
+        }
+        t.push_back(domain.max);
+      }
+      if (loop.curves[k].reversed) std::reverse(t.begin(), t.end());
+      for (std::size_t i = 0; i + 1 < t.size(); ++i) {
+        const Segment segment{l, c, t[i], t[i + 1], on_curve(l, c, t[i]), !free};
+        free ? follow(segment, on_curve(l, c, t[i + 1]), 12, ring) : ring.push_back(segment);
+      }
+    }
+    // Three sides at least enclose something.
+    while (ring.size() < 3) {
+      std::vector<Segment> finer;
+      for (const Segment& s : ring) halve(s, finer);
+      if (finer.size() == ring.size())
+        throw GeometryError(place_name(surface_, loop) + ": too few given points: the loop has " +
+                            std::to_string(ring.size()) + " edges");
+      ring = finer;
+    }
   }
-  void triangle(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
-    const int ia = vertex(a), ib = vertex(b), ic = vertex(c);
-    out_.triangles.push_back({ia, ib, ic});
-  }
-  TrimmedTriangles take() { return std::move(out_); }
 
- private:
-  std::map<std::pair<double, double>, int> index_;
+  void halve(const Segment& s, std::vector<Segment>& out) const {
+    const double mid = s.t0 + (s.t1 - s.t0) / 2;
+    if (s.given || mid == s.t0 || mid == s.t1) {
+      out.push_back(s);
+      return;
+    }
+    out.push_back({s.loop, s.curve, s.t0, mid, s.from, false});
+    out.push_back({s.loop, s.curve, mid, s.t1, on_curve(s.loop, s.curve, mid), false});
+  }
+
+  // Halves a segment until its chord keeps near the trim.
+  void follow(const Segment& s, const Vector2d& to, int depth, std::vector<Segment>& out) const {
+    const Vector3d a = position(s.from), chord = position(to) - a;
+    double largest = 0;
+    for (const double share : {0.25, 0.5, 0.75}) {
+      const Vector3d x = position(on_curve(s.loop, s.curve, s.t0 + share * (s.t1 - s.t0))) - a;
+      const double along = chord.squaredNorm() > 0 ? std::clamp(x.dot(chord) / chord.squaredNorm(), 0.0, 1.0) : 0;
+      // A chord in the parameter plane is curved on a curved surface: its own distance counts too.
+      largest = std::max(largest, (x - along * chord).norm());
+    }
+    std::vector<Segment> halves;
+    if (depth > 0 && largest > options_.chord * size_) halve(s, halves);
+    if (halves.size() < 2) {
+      out.push_back(s);
+      return;
+    }
+    follow(halves[0], halves[1].from, depth - 1, out);
+    follow(halves[1], to, depth - 1, out);
+  }
+
+  // Vertices and constraints of all rings; false where chords crossed, which have been divided then.
+  bool constrain(bool last) {
+    delaunay_.clear();
+    out_ = {};
+    std::vector<std::vector<Delaunay::Vertex_handle>> handles;
+    for (const std::vector<Segment>& ring : rings_) {
+      auto& own = handles.emplace_back();
+      Delaunay::Face_handle near;
+      for (const Segment& s : ring) {
+        const auto count = delaunay_.number_of_vertices();
+        const Vector2d x = plane_ * s.from;
+        const Delaunay::Vertex_handle v = delaunay_.insert({x.x(), x.y()}, near);
+        if (delaunay_.number_of_vertices() != count) {
+          v->info() = static_cast<int>(out_.uv.size());
+          out_.uv.push_back(s.from);
+        }
+        near = v->face();
+        own.push_back(v);
+        out_.boundary.push_back({v->info(), s.loop, s.curve, s.t0});
+      }
+    }
+    std::vector<std::vector<char>> crossed;
+    bool any = false;
+    for (std::size_t r = 0; r < rings_.size(); ++r) {
+      crossed.emplace_back(rings_[r].size(), 0);
+      for (std::size_t k = 0; k < handles[r].size(); ++k) {
+        const Delaunay::Vertex_handle a = handles[r][k], b = handles[r][(k + 1) % handles[r].size()];
+        if (a == b) continue;
+        const auto count = delaunay_.number_of_vertices();
+        delaunay_.insert_constraint(a, b);
+        if (delaunay_.number_of_vertices() == count) continue;
+        any = true;
+        crossed[r][k] = 1;
+      }
+    }
+    if (!any) return true;
+    if (last) {
+      for (const auto v : delaunay_.finite_vertex_handles()) v->info() = -1;
+      std::size_t k = 0;
+      for (const auto& ring : handles)
+        for (const Delaunay::Vertex_handle v : ring) v->info() = out_.boundary[k++].vertex;
+      for (const auto v : delaunay_.finite_vertex_handles()) {
+        if (v->info() >= 0) continue;
+        v->info() = static_cast<int>(out_.uv.size());
+        out_.uv.push_back(back_ * Vector2d(v->point().x(), v->point().y()));
+      }
+      return true;
+    }
+    divide_crossed(crossed);
+    return false;
+  }
+
+  // Halves every crossed segment and all whose boxes meet it.
+  void divide_crossed(const std::vector<std::vector<char>>& crossed) {
+    const auto box = [&](const std::vector<Segment>& ring, std::size_t k) {
+      Eigen::AlignedBox2d b(ring[k].from);
+      b.extend(ring[(k + 1) % ring.size()].from);
+      return b;
+    };
+    std::vector<Eigen::AlignedBox2d> bad;
+    for (std::size_t r = 0; r < rings_.size(); ++r)
+      for (std::size_t k = 0; k < rings_[r].size(); ++k)
+        if (crossed[r][k]) bad.push_back(box(rings_[r], k));
+    bool divided = false;
+    std::vector<std::vector<Segment>> finer(rings_.size());
+    for (std::size_t r = 0; r < rings_.size(); ++r)
+      for (std::size_t k = 0; k < rings_[r].size(); ++k) {
+        const Eigen::AlignedBox2d own = box(rings_[r], k);
+        const std::size_t before = finer[r].size();
+        if (std::any_of(bad.begin(), bad.end(), [&](const Eigen::AlignedBox2d& b) { return b.intersects(own); }))
+          halve(rings_[r][k], finer[r]);
+        else
+          finer[r].push_back(rings_[r][k]);
+        divided = divided || finer[r].size() - before > 1;
+      }
+    if (!divided) {
+      for (std::size_t r = 0; r < rings_.size(); ++r)
+        for (std::size_t k = 0; k < rings_[r].size(); ++k)
+          if (crossed[r][k])
+            throw GeometryError(place_name(surface_, surface_.loops[r]) +
+                                ": boundary edges between given points cross at " + point_text(rings_[r][k].from));
+    }
+    rings_ = std::move(finer);
+  }
+
+  // Nesting depth of the faces, counted by the constraints between them and the outside.
+  void mark_depths() {
+    for (auto face = delaunay_.all_faces_begin(); face != delaunay_.all_faces_end(); ++face) face->info() = -1;
+    std::vector<Delaunay::Face_handle> now{delaunay_.infinite_face()}, next;
+    for (int depth = 0; !now.empty(); ++depth, now.swap(next), next.clear()) {
+      while (!now.empty()) {
+        const Delaunay::Face_handle face = now.back();
+        now.pop_back();
+        if (face->info() >= 0) continue;
+        face->info() = depth;
+        for (int k = 0; k < 3; ++k) {
+          const Delaunay::Face_handle neighbour = face->neighbor(k);
+          if (neighbour->info() < 0) (face->is_constrained(k) ? next : now).push_back(neighbour);
+        }
+      }
+    }
+  }
+
+  bool inside(Delaunay::Face_handle f) const { return !delaunay_.is_infinite(f) && f->info() % 2 == 1; }
+
+  std::array<double, 3> edges(Delaunay::Face_handle f) const {
+    std::array<Vector3d, 3> x;
+    for (int k = 0; k < 3; ++k)
+      x[static_cast<std::size_t>(k)] = positions_[static_cast<std::size_t>(f->vertex(k)->info())];
+    return {(x[1] - x[2]).norm(), (x[2] - x[0]).norm(), (x[0] - x[1]).norm()};
+  }
+
+  // Too large, or too thin while its edges aren't short. The circumcircle of an equilateral triangle has 0.577 of its
+  // edge; circles of 0.7 leave edges around the size. A ratio of radius to shortest edge above sqrt(2) is an angle
+  // below 20.7 degrees [Ruppert 1995].
+  bool poor(Delaunay::Face_handle f) const {
+    const auto [a, b, c] = edges(f);
+    const double shortest = std::min({a, b, c}), p = (a + b + c) / 2;
+    const double radius = a * b * c / (4 * std::sqrt(std::max(p * (p - a) * (p - b) * (p - c), 0.0)));
+    return radius > 0.7 * size_ || (radius > std::numbers::sqrt2 * shortest && shortest > size_ / 8);
+  }
+
+  // Circumcentres of poor triangles become vertices unless they lie out of sight or in the circle over a boundary edge:
+  // boundary edges are never divided. Each is farther than its circle's radius from all others, so this ends.
+  // [Chew 1989; Ruppert 1995]
+  void refine() {
+    for (const Vector2d& uv : out_.uv) positions_.push_back(position(uv));
+    struct Task {
+      Delaunay::Vertex_handle a, b, c;
+    };
+    std::deque<Task> tasks;
+    const auto push = [&](Delaunay::Face_handle f) {
+      if (inside(f) && poor(f)) tasks.push_back({f->vertex(0), f->vertex(1), f->vertex(2)});
+    };
+    for (auto f = delaunay_.finite_faces_begin(); f != delaunay_.finite_faces_end(); ++f) push(f);
+    std::vector<Delaunay::Edge> border;
+    std::vector<Delaunay::Face_handle> conflicts;
+    while (!tasks.empty()) {
+      const Task task = tasks.front();
+      tasks.pop_front();
+      Delaunay::Face_handle face;
+      if (!delaunay_.is_face(task.a, task.b, task.c, face)) continue;
+      const Kernel::Point_2 x = delaunay_.circumcenter(face);
+      Delaunay::Locate_type type;
+      int index = 0;
+      const Delaunay::Face_handle at = delaunay_.locate(x, type, index, face);
+      if (type == Delaunay::VERTEX || type == Delaunay::OUTSIDE_CONVEX_HULL || type == Delaunay::OUTSIDE_AFFINE_HULL ||
+          !inside(at))
+        continue;
+      border.clear();
+      conflicts.clear();
+      delaunay_.get_conflicts_and_boundary(x, std::back_inserter(conflicts), std::back_inserter(border), at);
+      // The circle's triangle must be in sight of its centre.
+      if (std::find(conflicts.begin(), conflicts.end(), face) == conflicts.end()) continue;
+      const bool encroaches = std::any_of(border.begin(), border.end(), [&](const Delaunay::Edge& e) {
+        if (!e.first->is_constrained(e.second)) return false;
+        const auto &p = e.first->vertex(Delaunay::cw(e.second))->point(),
+                   &q = e.first->vertex(Delaunay::ccw(e.second))->point();
+        return (p.x() - x.x()) * (q.x() - x.x()) + (p.y() - x.y()) * (q.y() - x.y()) <= 0;
+      });
+      if (encroaches) continue;
+      const Vector2d uv = back_ * Vector2d(x.x(), x.y());
+      if (!surface_.surface.u().domain().contains(uv.x()) || !surface_.surface.v().domain().contains(uv.y())) continue;
+      if (!(static_cast<double>(out_.uv.size()) < most_triangles))
+        throw GeometryError(place_name(surface_) + ": triangles of size " + text(size_) + " are more than " +
+                            text(most_triangles));
+      const Delaunay::Vertex_handle v = delaunay_.insert(x, type, at, index);
+      v->info() = static_cast<int>(out_.uv.size());
+      out_.uv.push_back(uv);
+      positions_.push_back(position(uv));
+      Delaunay::Face_circulator around = delaunay_.incident_faces(v), end = around;
+      do around->info() = 1;
+      while (++around != end);
+      do push(around);
+      while (++around != end);
+    }
+  }
+
+  void collect() {
+    TriangleQuality& quality = out_.quality;
+    quality = {std::numbers::pi, HUGE_VAL, 0};
+    std::vector<int> number(out_.uv.size(), -1);
+    std::vector<Vector2d> used;
+    const auto vertex = [&](int k) {
+      int& n = number[static_cast<std::size_t>(k)];
+      if (n < 0) {
+        n = static_cast<int>(used.size());
+        used.push_back(out_.uv[static_cast<std::size_t>(k)]);
+      }
+      return n;
+    };
+    for (auto f = delaunay_.finite_faces_begin(); f != delaunay_.finite_faces_end(); ++f) {
+      if (!inside(f)) continue;
+      out_.triangles.push_back(
+          {vertex(f->vertex(0)->info()), vertex(f->vertex(1)->info()), vertex(f->vertex(2)->info())});
+      const std::array<double, 3> e = edges(f);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double a = e[k], b = e[(k + 1) % 3], c = e[(k + 2) % 3];
+        quality.shortest_edge = std::min(quality.shortest_edge, a);
+        quality.longest_edge = std::max(quality.longest_edge, a);
+        quality.smallest_angle =
+            std::min(quality.smallest_angle, std::acos(std::clamp((b * b + c * c - a * a) / (2 * b * c), -1.0, 1.0)));
+      }
+    }
+    if (out_.triangles.empty()) quality = {};
+    out_.uv = std::move(used);
+    for (BoundaryVertex& b : out_.boundary) b.vertex = number[static_cast<std::size_t>(b.vertex)];
+    std::erase_if(out_.boundary, [](const BoundaryVertex& b) { return b.vertex < 0; });
+  }
+
+  const TrimmedSurface& surface_;
+  const TriangulationOptions& options_;
+  Matrix2d plane_ = Matrix2d::Identity(), back_ = Matrix2d::Identity();  // uv to the plane and back
+  double area_ = 0, size_ = 0;
+  std::vector<std::vector<Segment>> rings_;
+  Delaunay delaunay_;
+  std::vector<Vector3d> positions_;
   TrimmedTriangles out_;
 };
-
-// Grid points of the cell inside the polygons and not near their sides.
-Polygon inner_points(const std::vector<Polygon>& polygons, const Cell& cell, int per_cell) {
-  constexpr double clearance = 0.3;  // of the grid's spacing
-  Polygon out;
-  for (int l = 1; l < per_cell; ++l)
-    for (int k = 1; k < per_cell; ++k) {
-      const Vector2d g(grid(cell.u.min, cell.u.max, k, per_cell), grid(cell.v.min, cell.v.max, l, per_cell));
-      const auto scaled = [&](const Vector2d& p) {
-        return Vector2d((p.x() - g.x()) / cell.u.length(), (p.y() - g.y()) / cell.v.length());
-      };
-      int winding = 0;
-      bool near = false;
-      for (const Polygon& polygon : polygons)
-        for (std::size_t s = 0; s < polygon.size() && !near; ++s) {
-          const Vector2d a = scaled(polygon[s]), b = scaled(polygon[(s + 1) % polygon.size()]), d = b - a;
-          const double cross = a.x() * b.y() - a.y() * b.x();
-          if (a.y() <= 0 && b.y() > 0 && cross > 0) ++winding;
-          if (a.y() > 0 && b.y() <= 0 && cross < 0) --winding;
-          const double t = d.squaredNorm() > 0 ? std::clamp(-a.dot(d) / d.squaredNorm(), 0.0, 1.0) : 0;
-          near = (a + t * d).norm() < clearance / per_cell;
-        }
-      if (!near && winding > 0) out.push_back(g);
-    }
-  return out;
-}
-
-// Nesting depth of the faces, counted by the polygon sides between them and the outside.
-void mark_depths(Delaunay& delaunay) {
-  for (auto face = delaunay.all_faces_begin(); face != delaunay.all_faces_end(); ++face) face->info() = -1;
-  std::vector<Delaunay::Face_handle> now = {delaunay.infinite_face()}, next;
-  for (int depth = 0; !now.empty(); ++depth, now.swap(next), next.clear())
-    while (!now.empty()) {
-      const Delaunay::Face_handle face = now.back();
-      now.pop_back();
-      if (face->info() >= 0) continue;
-      face->info() = depth;
-      for (int k = 0; k < 3; ++k) {
-        const Delaunay::Face_handle neighbour = face->neighbor(k);
-        if (neighbour->info() < 0) (face->is_constrained(k) ? next : now).push_back(neighbour);
-      }
-    }
-}
-
-// False, and nothing added, where sides of the polygons cross and `last` is not set.
-bool triangulate_polygons(const std::vector<Polygon>& polygons, const Polygon& inner, bool last, Mesh& mesh) {
-  using Place = Kernel::Point_2;
-  Delaunay delaunay;
-  const auto insert = [&](const Vector2d& p, Delaunay::Vertex_handle near) {
-    return delaunay.insert(Place(p.x(), p.y()), near == nullptr ? Delaunay::Face_handle() : near->face());
-  };
-  std::vector<std::vector<Delaunay::Vertex_handle>> rings;
-  for (const Polygon& polygon : polygons) {
-    Delaunay::Vertex_handle near = nullptr;
-    auto& ring = rings.emplace_back();
-    for (const Vector2d& p : polygon) ring.push_back(near = insert(p, near));
-  }
-  Delaunay::Vertex_handle near = nullptr;
-  for (const Vector2d& p : inner) near = insert(p, near);
-  const auto vertices = delaunay.number_of_vertices();
-  for (const auto& ring : rings)
-    for (std::size_t k = 0; k < ring.size(); ++k)
-      if (ring[k] != ring[(k + 1) % ring.size()]) delaunay.insert_constraint(ring[k], ring[(k + 1) % ring.size()]);
-  if (delaunay.dimension() < 2) return true;
-  if (delaunay.number_of_vertices() != vertices && !last) return false;
-  mark_depths(delaunay);
-  const auto at = [](Delaunay::Vertex_handle v) { return Vector2d(v->point().x(), v->point().y()); };
-  for (auto face = delaunay.finite_faces_begin(); face != delaunay.finite_faces_end(); ++face)
-    if (face->info() % 2 == 1) mesh.triangle(at(face->vertex(0)), at(face->vertex(1)), at(face->vertex(2)));
-  return true;
-}
-
-void add_quads(const Cell& cell, int per_cell, Mesh& mesh) {
-  for (int l = 0; l < per_cell; ++l)
-    for (int k = 0; k < per_cell; ++k) {
-      const auto corner = [&](int a, int b) {
-        return Vector2d(grid(cell.u.min, cell.u.max, k + a, per_cell), grid(cell.v.min, cell.v.max, l + b, per_cell));
-      };
-      mesh.triangle(corner(0, 0), corner(1, 0), corner(1, 1));
-      mesh.triangle(corner(0, 0), corner(1, 1), corner(0, 1));
-    }
-}
 
 }  // namespace
 
 TrimmedTriangles triangulate(const TrimmedSurface& surface, const TrimTopology& topology,
                              const TriangulationOptions& options) {
-  const KnotMesh& knots = topology.mesh;
-  const int per_cell = std::max(options.per_cell, 1);
-
-  // Polygons of the cut cells; where sides of one cell's polygons would cross (material thinner than the chord), finer.
-  constexpr int attempts = 9;
-  EdgePoints edges(knots, per_cell);
-  std::vector<std::vector<Polygon>> polygons;
-  for (const CutCell& cut : topology.cut_cells) {
-    const Cell cell = cell_at(knots, cut.i, cut.j);
-    double chord = options.chord;
-    for (int attempt = 1;; ++attempt, chord /= 4) {
-      auto candidate = polygons_of(surface, cut, cell, chord);
-      Mesh scratch;
-      if (attempt < attempts && !triangulate_polygons(candidate, {}, false, scratch)) continue;
-      polygons.push_back(std::move(candidate));
-      break;
-    }
-    for (const Polygon& polygon : polygons.back())
-      for (const Vector2d& p : polygon) edges.add(cell, p);
-  }
-
-  Mesh mesh;
-  std::size_t next_cut = 0;
-  for (int j = 0; j < knots.cells_v(); ++j)
-    for (int i = 0; i < knots.cells_u(); ++i) {
-      const Cell cell = cell_at(knots, i, j);
-      std::vector<Polygon> refined;
-      if (topology.cells[knots.cell(i, j)] == CellKind::inside) {
-        if (edges.empty(cell)) {
-          add_quads(cell, per_cell, mesh);
-          continue;
-        }
-        refined = {edges.refined(
-            cell,
-            {{cell.u.min, cell.v.min}, {cell.u.max, cell.v.min}, {cell.u.max, cell.v.max}, {cell.u.min, cell.v.max}})};
-      } else if (topology.cells[knots.cell(i, j)] == CellKind::cut) {
-        while (next_cut < topology.cut_cells.size() &&
-               knots.cell(topology.cut_cells[next_cut].i, topology.cut_cells[next_cut].j) < knots.cell(i, j))
-          ++next_cut;
-        if (next_cut == topology.cut_cells.size() || topology.cut_cells[next_cut].i != i ||
-            topology.cut_cells[next_cut].j != j)
-          continue;
-        for (const Polygon& polygon : polygons[next_cut]) refined.push_back(edges.refined(cell, polygon));
-      } else {
-        continue;
-      }
-      triangulate_polygons(refined, inner_points(refined, cell, per_cell), true, mesh);
-    }
-  return mesh.take();
+  return Mesher(surface, topology, options).run();
 }
 
 }  // namespace toile

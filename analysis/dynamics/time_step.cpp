@@ -41,7 +41,7 @@ void apply_free_part(const AffineMap& map, const Eigen::VectorXd& dx, Eigen::Vec
 // Lanczos with full reorthogonalisation on M^-1/2 T^T K T M^-1/2: the residual of the largest Ritz pair bounds its
 // distance to an eigenvalue, the largest one for all but unlucky starts. [Parlett 1998, ch. 13]
 TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                              const Eigen::VectorXd& q) {
+                              const Eigen::VectorXd& q, const Pull& pull) {
   TimeStepBound bound;
   bound.dt = std::numeric_limits<double>::infinity();
   const int nodes = map.nodes();
@@ -65,6 +65,7 @@ TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, con
     apply_free_part(map, dx, dq);
     model.apply_tangent(q, dq, df);
     map.reduce(df, image);
+    if (pull.projection) pull.projection->add_tension_stiffness(pull.tensions, dx, image);
     image.array() *= scale.array();
     if (!image.allFinite()) throw SolverError("no time step: the stiffness of this state is not finite");
     alpha[k] = basis.col(k).dot(image);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "analysis/affine_map.h"
+#include "analysis/projection/fast_projection.h"
 #include "analysis/shell/shell_model.h"
 
 namespace toile {
@@ -14,10 +15,15 @@ struct TimeStepBound {
   bool bending = false;     // whether bending rather than membrane stiffness dominates there
 };
 
-// Of the undamped, unprojected model at q, with the slope of the bending law at q's curvatures: a state that unbends
-// gets stiffer, so a run asks again. Cost: some 40 applications of the tangent. Deterministic. Throws SolverError
-// naming the node where a mass is not positive, or where the stiffness at q is not finite.
+// Of the undamped model at q, with the slope of the bending law at q's curvatures: a state that unbends gets stiffer, so a
+// run asks again. `pull` adds what taut strain rows do against turning (their stiffness along themselves is implicit).
+// Cost: some 40 applications of the tangent. Deterministic. Throws SolverError naming the node where a mass is not
+// positive, or where the stiffness at q is not finite.
+struct Pull {
+  const FastProjection* projection = nullptr;
+  Eigen::VectorXd tensions;  // FastProjection::tensions at q
+};
 TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                              const Eigen::VectorXd& q);
+                              const Eigen::VectorXd& q, const Pull& pull = {});
 
 }  // namespace toile

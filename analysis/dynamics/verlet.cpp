@@ -20,25 +20,17 @@ Vector total_force(const DynamicSystem& system, const Vector& q, ShellEnergy* en
   return f + system.loads.force;
 }
 
-// M a + C (v + h a - wind) = f, with h = 0 for an explicit start.
-Vector acceleration(const DynamicSystem& system, const Vector& q_force, const Vector& v, double h) {
+// M a + C (v + h (a + constraint) - wind) = f, with h = 0 for an explicit start.
+Vector acceleration(const DynamicSystem& system, const Vector& q_force, const Vector& v, const Vector& constraint,
+                    double h) {
   Vector a(3 * system.map->nodes());
   system.map->reduce(q_force, a);
   for (int k = 0; k < system.map->nodes(); ++k) {
     const double m = system.node_mass[k], c = system.node_drag[k];
-    a.segment<3>(3 * k) = (a.segment<3>(3 * k) - c * (v.segment<3>(3 * k) - system.loads.wind)) / (m + h * c);
+    const Eigen::Vector3d known = v.segment<3>(3 * k) + h * constraint.segment<3>(3 * k);
+    a.segment<3>(3 * k) = (a.segment<3>(3 * k) - c * (known - system.loads.wind)) / (m + h * c);
   }
   return a;
-}
-
-// 1 + c dt/2 of a row's own control points.
-double drag_factor(const ShellModel& model, const ScalarRow& row, double dt) {
-  double drag = 0, mass = 0;
-  for (std::size_t k = 0; k < row.index.size(); ++k) {
-    drag += std::abs(row.value[k]) * model.lumped_drag()[row.index[k]];
-    mass += std::abs(row.value[k]) * model.lumped_mass()[row.index[k]];
-  }
-  return mass > 0 ? 1 + 0.5 * dt * drag / mass : 1;
 }
 
 void add(const ScalarRow& row, const Eigen::Vector3d& force, Vector& f) {
@@ -54,12 +46,12 @@ Eigen::Matrix3Xd add_constraint_forces(const DynamicSystem& system, double dt, V
   for (std::size_t r = 0; r < rows.strain.size(); ++r) {
     const ScalarRow& row = rows.strain[r].row;
     const Eigen::Vector3d impulse = projection.strain_impulses().col(r);
-    if (!impulse.isZero(0)) add(row, -per_step * drag_factor(*system.model, row, dt) * impulse, f);
+    if (!impulse.isZero(0)) add(row, -per_step * impulse, f);
   }
   Eigen::Matrix3Xd place(3, rows.place.size());
   for (std::size_t p = 0; p < rows.place.size(); ++p) {
     const ScalarRow& row = rows.place[p].row;
-    place.col(p) = -per_step * drag_factor(*system.model, row, dt) * projection.place_multipliers().col(p);
+    place.col(p) = -per_step * projection.place_multipliers().col(p);
     add(row, place.col(p), f);
   }
   return place;
@@ -93,7 +85,7 @@ double motion_work(const DynamicSystem& system, const Vector& q0, double t0, dou
 void initialise(const DynamicSystem& system, DynamicState& state) {
   Vector q(3 * system.map->control_points());
   system.map->expand(state.x, state.t, q);
-  state.a = acceleration(system, total_force(system, q), state.v, 0);
+  state.a = acceleration(system, total_force(system, q), state.v, Vector::Zero(state.v.size()), 0);
 }
 
 StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
@@ -101,15 +93,17 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
   report.dt = dt;
   DynamicState next;
   next.t = state.t + dt;
-  next.x = state.x + dt * state.v + (0.5 * dt * dt) * state.a;
+  const Vector candidate = state.x + dt * state.v + (0.5 * dt * dt) * state.a;
+  next.x = candidate;
   report.projection.converged = true;
   if (system.projection) {
     const auto start = std::chrono::steady_clock::now();
-    report.projection = system.projection->project(next.x, next.t);
+    report.projection = system.projection->step(next.x, next.t, state.x, dt);
+    report.limit_energy = report.projection.energy;
     report.projection_seconds = seconds_since(start);
   }
   const Vector move = next.x - state.x;
-  const Vector v_half = move / dt;
+  const Vector v_half = move / dt, constraint = (next.x - candidate) / (dt * dt);
 
   Vector q0(3 * system.map->control_points()), q1(q0.size());
   system.map->expand(state.x, state.t, q0);
@@ -117,15 +111,19 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
   const auto start = std::chrono::steady_clock::now();
   const Vector force = total_force(system, q1, &report.elastic);
   report.force_seconds = seconds_since(start);
-  next.a = acceleration(system, force, v_half, 0.5 * dt);
+  next.a = acceleration(system, force, v_half, constraint, 0.5 * dt);
   next.v = v_half + (0.5 * dt) * next.a;
 
   report.load_work = system.loads.force.dot(q1 - q0);
   for (int k = 0; k < system.map->nodes(); ++k) {
-    const auto v0 = state.v.segment<3>(3 * k), v1 = next.v.segment<3>(3 * k);
-    report.kinetic += 0.5 * system.node_mass[k] * v1.squaredNorm();
+    report.kinetic += 0.5 * system.node_mass[k] * v_half.segment<3>(3 * k).squaredNorm();
+    if (!system.projection) report.kinetic_end += 0.5 * system.node_mass[k] * next.v.segment<3>(3 * k).squaredNorm();
+    const auto held = constraint.segment<3>(3 * k);
+    report.kick += 0.125 * dt * dt * system.node_mass[k] *
+                   std::max((state.a.segment<3>(3 * k) + held).squaredNorm(),
+                            (next.a.segment<3>(3 * k) + held).squaredNorm());
     report.drag_work -=
-        system.node_drag[k] * (0.5 * (v0 + v1) - system.loads.wind).dot(move.segment<3>(3 * k));
+        system.node_drag[k] * (v_half.segment<3>(3 * k) - system.loads.wind).dot(move.segment<3>(3 * k));
   }
   report.finite = std::isfinite(report.kinetic) && std::isfinite(report.elastic.total()) && next.x.allFinite() &&
                   next.a.allFinite();

@@ -25,15 +25,19 @@ struct StepReport {
   double dt = 0;
   ProjectionReport projection;
   ShellEnergy elastic;           // at the end
-  double kinetic = 0;            // J, at the end
+  double limit_energy = 0;       // J, of the strain limits at the end
+  double kinetic = 0;            // J, in the middle of the step, where the velocity obeys the constraints
+  double kinetic_end = 0;        // J, at the end; without projection only, whose forces the velocity there lacks
+  double kick = 0;               // J, kinetic energy of half a step's acceleration: by so much `kinetic` depends on dt
   double load_work = 0;          // J, work of dead loads in the step
   double drag_work = 0;          // J, work of drag (negative: dissipated)
   double motion_work = 0;        // J, work of moved pins
   bool finite = true;
   double force_seconds = 0, projection_seconds = 0;  // wall time
 };
-// kinetic + elastic - load_work - drag_work - motion_work never rises from step to step, up to the order of the scheme:
-// what projection takes is lost, nothing is gained. Masses and drag are the nodes' (design.md, "Numerics").
+// In the middle of a step, kinetic + mean of (elastic + limit_energy) at both ends - works up to the step - half the works
+// of the step never rises, up to the order of the scheme: what projection takes is lost, nothing is gained. Masses and drag
+// are the nodes' (design.md, "Numerics").
 
 // Everything a step needs that doesn't change from step to step. The caller keeps the parts alive.
 struct DynamicSystem {
@@ -49,13 +53,13 @@ void initialise(const DynamicSystem& system, DynamicState& state);
 
 // Advances state by dt. The velocity between the steps is (x_n+1 - x_n) / dt after projection; drag is implicit.
 //   x~ = x + dt v + dt^2/2 a, projected at t + dt;  v_half = (x_n+1 - x_n) / dt
-//   M a + C (v_half + dt/2 a - wind) = T^T (f_int + f_ext) at n+1;  v = v_half + dt/2 a
+//   M a + C (v_half + dt/2 (a + a_c) - wind) = T^T (f_int + f_ext) at n+1;  v = v_half + dt/2 a
+// with the constraints' acceleration a_c of the step: drag sees the velocity that the constraints allow.
 // A step that ends in non-finite numbers leaves `state` as it was and says so.
 StepReport step(const DynamicSystem& system, DynamicState& state, double dt);
 
 // Force that each fixed control point and each place row exerts on the cloth [N] at the state's time, dt being the last
-// step's. A constraint's force is -J^T lambda (1 + c dt/2) / dt^2, c = drag over mass: half a step of the implicit drag
-// acts on the multipliers' half of the velocity too. Exact at rest: the sum balances the dead loads.
+// step's. A constraint's force is -J^T lambda / dt^2. Exact at rest: the sum balances the dead loads.
 struct Reactions {
   Eigen::Matrix3Xd fixed;   // AffineMap::fixed order
   Eigen::Matrix3Xd place;   // place rows

@@ -28,15 +28,19 @@ ScalarRow make_row(const MaterialPoint& point, int which) {
 
 }  // namespace
 
-std::vector<StrainRow> strain_rows(const ShellModel& model, const std::vector<std::vector<ConstraintPoint>>& points) {
+std::vector<StrainRow> strain_rows(const ShellModel& model, const std::vector<std::vector<ConstraintPoint>>& points,
+                                   const Eigen::VectorXd& mass) {
   std::vector<StrainRow> rows;
   for (int panel = 0; panel < static_cast<int>(points.size()); ++panel)
     for (int k = 0; k < static_cast<int>(points[panel].size()); ++k) {
       const ConstraintPoint& point = points[panel][k];
       if (!point.used) continue;
       const MaterialPoint functions = model.material_point(panel, point.u, point.v);
-      rows.push_back({make_row(functions, 1), panel, k, false});
-      rows.push_back({make_row(functions, 2), panel, k, true});
+      double area = 0;
+      for (std::size_t i = 0; i < functions.index.size(); ++i) area += functions.value[0][i] * mass[functions.index[i]];
+      area /= model.panels()[panel].fabric.density;
+      rows.push_back({make_row(functions, 1), panel, k, false, area});
+      rows.push_back({make_row(functions, 2), panel, k, true, area});
     }
   return rows;
 }

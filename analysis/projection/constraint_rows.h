@@ -23,7 +23,8 @@ struct StrainRow {
   int panel = 0;
   int point = 0;               // in the panel's constraint points
   bool warp = false;
-  bool guard = false;          // redundant at rest: enters softly, see ProjectionOptions::guard_softness
+  double area = 0;             // m2, of the cloth that the row speaks for: sum of N_I mass_I over the density
+  double stiffness = 0;        // N m, force per strain times area; 0: hard
 };
 struct PlaceRow {
   ScalarRow row;
@@ -37,8 +38,10 @@ struct ConstraintRows {
 };
 
 // Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points() gives
-// them. Functions that vanish at a point (all but p per direction on a C1 knot line) are left out.
-std::vector<StrainRow> strain_rows(const ShellModel& model, const std::vector<std::vector<ConstraintPoint>>& points);
+// them; `mass` of all control points [kg]. Functions that vanish at a point (all but p per direction on a C1 knot line)
+// are left out. Rows are hard.
+std::vector<StrainRow> strain_rows(const ShellModel& model, const std::vector<std::vector<ConstraintPoint>>& points,
+                                   const Eigen::VectorXd& mass);
 
 // The row of one material point's place, for pins.
 ScalarRow place_row(const ShellModel& model, int panel, double u, double v);

@@ -16,12 +16,13 @@ namespace {
 
 constexpr int patience = 15;           // iterations without gain before giving up; dependent rows make pauses of up to 10
 constexpr double least_gain = 0.99;    // a violation above this times the best so far is no gain
+constexpr double poor_gain = 0.25;     // an iteration that leaves more than this of the residual asks for a new factor
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 
 }  // namespace
 
-// System rows: one per strain row, then three (x, y, z) per place row. Row i of J is (row of D) x direction_i: the
-// current tangent for strain rows, a unit vector for place rows; hence
+// System rows: one per strain row, then three (x, y, z) per place row. Row i of J is (row of D) x direction_i: a
+// tangent for strain rows, a unit vector for place rows; hence
 // (J M^-1 J^T)_ij = (D M^-1 D^T)_ij (direction_i . direction_j), whose first factor never changes.
 struct FastProjection::Impl {
   AffineMap map;
@@ -35,9 +36,10 @@ struct FastProjection::Impl {
   std::vector<double> gram, values;   // per entry of the pattern
   std::unique_ptr<Cholesky> factor;
 
-  Eigen::Matrix3Xd y, direction, targets, fixed_places;  // direction: scaled, per system row
+  Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
   Eigen::VectorXd scale, residual, rhs, solution;
-  Eigen::VectorXd strain_lambda;
+  Eigen::VectorXd strain_lambda, compliance;  // compliance 0: hard
+  std::vector<char> slack;                    // within the band without a force: takes no part for now
   Eigen::Matrix3Xd place_lambda, strain_impulse;
 
   Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
@@ -46,11 +48,28 @@ struct FastProjection::Impl {
   int strains() const { return static_cast<int>(rows.strain.size()); }
   int places() const { return static_cast<int>(rows.place.size()); }
   int size() const { return strains() + 3 * places(); }
+  const StrainBand& band(int r) const { return rows.strain[r].warp ? options.warp : options.weft; }
+  bool takes_part(int r) const { return gram_diagonal[r] > 0; }
+  bool soft(int r) const { return compliance[r] > 0; }
+  LimitLaw law(int r) const { return {band(r), compliance[r]}; }
+  // The law of a row in forces instead of a step's multipliers.
+  LimitLaw force_law(int r) const { return {band(r), 1 / rows.strain[r].stiffness}; }
+  double strain(const Eigen::Matrix3Xd& tangent, int r) const { return 0.5 * (tangent.col(r).squaredNorm() - 1); }
+  double limit_energy() const {
+    double sum = 0;
+    for (int r = 0; r < strains(); ++r)
+      if (takes_part(r) && rows.strain[r].stiffness > 0) sum += force_law(r).energy(strain(y, r));
+    return sum;
+  }
 
   void build(const Eigen::VectorXd& node_mass);
+  void begin(double t);
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
+  void point_along(const Eigen::Matrix3Xd& tangents);
   bool factorise(ProjectionReport& report);
   void correct(Eigen::Ref<Eigen::VectorXd> x);
+  void push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x);
+  ProjectionReport iterate(Eigen::Ref<Eigen::VectorXd> x, bool fixed_directions);
 };
 
 void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
@@ -95,6 +114,7 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   if (size() > 0) factor = std::make_unique<Cholesky>(pattern);
 
   y.resize(3, scalars);
+  tangents.resize(3, scalars);
   direction.resize(3, size());
   targets.resize(3, places());
   scale.resize(size());
@@ -102,23 +122,42 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   rhs.resize(size());
   solution.resize(size());
   strain_lambda = Eigen::VectorXd::Zero(strains());
+  compliance = Eigen::VectorXd::Zero(strains());
+  slack.assign(strains(), 0);
   place_lambda = Eigen::Matrix3Xd::Zero(3, places());
   strain_impulse = Eigen::Matrix3Xd::Zero(3, strains());
 }
 
+void FastProjection::Impl::begin(double t) {
+  fixed_places = map.fixed_places(t);
+  for (int p = 0; p < places(); ++p) targets.col(p) = rows.place[p].target(t);
+  strain_lambda.setZero();
+  compliance.setZero();
+  place_lambda.setZero();
+  strain_impulse.setZero();
+}
+
 void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
   evaluate(composed, x, fixed_places, y);
-  report.strain_violation = report.place_violation = 0;
+  report.strain_violation = report.place_violation = report.residual = report.energy = report.tension = 0;
   report.worst_row = -1;
   for (int r = 0; r < strains(); ++r) {
-    if (gram_diagonal[r] == 0) {
-      residual[r] = 0;
-      continue;
+    slack[r] = 0;
+    residual[r] = 0;
+    if (!takes_part(r)) continue;
+    const double C = strain(y, r);
+    double violation = std::abs(C);
+    residual[r] = C;
+    if (soft(r)) {
+      const StrainBand& b = band(r);
+      if (b.slack > 0) violation = std::max({C - b.stretch, -b.compress - C, 0.0});
+      slack[r] = b.slack > 0 && strain_lambda[r] == 0 && law(r).slack_at(C);
+      const double lambda = strain_lambda[r] != 0 ? strain_lambda[r] : std::copysign(0.0, C);
+      residual[r] = slack[r] ? 0 : C - law(r).strain(lambda);
+      report.residual = std::max(report.residual, std::abs(residual[r]) / std::min(b.stretch, b.compress));
     }
-    residual[r] = 0.5 * (y.col(r).squaredNorm() - 1);
-    if (rows.strain[r].guard && std::isfinite(residual[r])) continue;
-    if (!(std::abs(residual[r]) <= report.strain_violation)) {  // NaN counts as worst
-      report.strain_violation = std::abs(residual[r]);
+    if (!(violation <= report.strain_violation)) {  // NaN counts as worst
+      report.strain_violation = violation;
       report.worst_row = r;
     }
   }
@@ -131,22 +170,27 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
       report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
 }
 
-bool FastProjection::Impl::factorise(ProjectionReport& report) {
+void FastProjection::Impl::point_along(const Eigen::Matrix3Xd& along) {
   for (int r = 0; r < strains(); ++r) {
-    const double length = std::max(y.col(r).norm(), shortest_tangent);
-    scale[r] = gram_diagonal[r] > 0 ? 1 / (std::sqrt(gram_diagonal[r]) * length) : 0;
-    direction.col(r) = scale[r] * y.col(r);
+    const double length = std::max(along.col(r).norm(), shortest_tangent);
+    scale[r] = takes_part(r) ? 1 / (std::sqrt(gram_diagonal[r]) * length) : 0;
+    direction.col(r) = scale[r] * along.col(r);
   }
   for (int i = strains(); i < size(); ++i) {
     scale[i] = 1 / std::sqrt(gram_diagonal[system_scalar[i]]);
     direction.col(i) = scale[i] * Eigen::Vector3d::Unit((i - strains()) % 3);
   }
+}
+
+bool FastProjection::Impl::factorise(ProjectionReport& report) {
   const double* t = direction.data();
   for (int c = 0; c < size(); ++c) {
+    const bool idle = c < strains() && slack[c];
     const double t0 = t[3 * c], t1 = t[3 * c + 1], t2 = t[3 * c + 2];
     for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
-      const double* s = t + 3 * pattern.row[e];
-      values[e] = gram[e] * (s[0] * t0 + s[1] * t1 + s[2] * t2);
+      const int r = pattern.row[e];
+      const double* s = t + 3 * r;
+      values[e] = idle || (r < strains() && slack[r]) ? 0 : gram[e] * (s[0] * t0 + s[1] * t1 + s[2] * t2);
     }
   }
   // Strain rows may depend on each other (an edge between two pins); place rows may not, and get no softness unless the
@@ -154,9 +198,9 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
   double strain_softness = options.regularisation, place_softness = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
     for (int i = 0; i < size(); ++i) {
-      const bool guard = i < strains() && rows.strain[i].guard;
-      values[pattern.column_start[i]] =
-          1 + (guard ? std::max(options.guard_softness, strain_softness) : i < strains() ? strain_softness : place_softness);
+      double softness = i < strains() ? strain_softness : place_softness;
+      if (i < strains() && soft(i)) softness = std::max(softness, law(i).slope(strain_lambda[i]) * scale[i] * scale[i]);
+      values[pattern.column_start[i]] = 1 + softness;
     }
     const auto start = std::chrono::steady_clock::now();
     const bool positive = factor->factorise(values);
@@ -168,13 +212,13 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
   return false;
 }
 
-void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
-  rhs = scale.cwiseProduct(residual);
-  factor->solve(rhs, solution);
+// x -= M^-1 J^T amounts, for amounts of scaled rows.
+void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x) {
   double* places_of = x.data();
   for (int i = 0; i < size(); ++i) {
     const int r = system_scalar[i];
-    const double z = solution[i];
+    const double z = amounts[i];
+    if (z == 0) continue;
     const double p0 = z * direction(0, i), p1 = z * direction(1, i), p2 = z * direction(2, i);
     for (int e = composed.free.start[r]; e < composed.free.start[r + 1]; ++e) {
       double* p = places_of + 3 * composed.free.column[e];
@@ -182,11 +226,56 @@ void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
     }
   }
   for (int r = 0; r < strains(); ++r) {
-    strain_lambda[r] += scale[r] * solution[r];
-    strain_impulse.col(r) += solution[r] * direction.col(r);
+    strain_lambda[r] += scale[r] * amounts[r];
+    strain_impulse.col(r) += amounts[r] * direction.col(r);
   }
   for (int i = strains(); i < size(); ++i)
-    place_lambda((i - strains()) % 3, (i - strains()) / 3) += scale[i] * solution[i];
+    place_lambda((i - strains()) % 3, (i - strains()) / 3) += scale[i] * amounts[i];
+}
+
+void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
+  rhs = scale.cwiseProduct(residual);
+  factor->solve(rhs, solution);
+  // A row with slack can't change sides within an iteration: it lets go first.
+  for (int r = 0; r < strains(); ++r)
+    if (soft(r) && band(r).slack > 0) {
+      const double after = strain_lambda[r] + scale[r] * solution[r];
+      const double side = strain_lambda[r] != 0 ? strain_lambda[r] : residual[r];
+      if (slack[r] || after * side < 0) solution[r] = scale[r] > 0 ? -strain_lambda[r] / scale[r] : 0;
+    }
+  push(solution, x);
+}
+
+ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, bool fixed_directions) {
+  ProjectionReport report;
+  double best = std::numeric_limits<double>::infinity(), last = best;
+  int waited = 0;
+  bool factored = false;
+  while (true) {
+    measure(x, report);
+    const double excess = std::max({report.strain_violation / std::max(options.tolerance, 1e-30),
+                                    report.place_violation / std::max(options.place_tolerance, 1e-30),
+                                    report.residual / options.residual});
+    if (size() == 0 || (report.converged && excess <= 1 && report.iterations >= options.min_iterations)) break;
+    if (report.iterations >= options.max_iterations) break;
+    if (!std::isfinite(excess)) break;
+    waited = excess < least_gain * best ? 0 : waited + 1;
+    best = std::min(best, excess);
+    if (waited >= patience) break;
+    if (!fixed_directions) point_along(y);
+    if (!fixed_directions || !factored || excess > poor_gain * last) {
+      if (!factorise(report)) break;
+      factored = true;
+    }
+    last = excess;
+    correct(x);
+    ++report.iterations;
+  }
+  for (int r = 0; r < strains(); ++r)
+    if (takes_part(r) && soft(r))
+      report.tension = std::max(report.tension, force_law(r).multiplier(strain(y, r)) * gram_diagonal[r]);
+  if (fixed_directions) report.energy = limit_energy();
+  return report;
 }
 
 FastProjection::FastProjection(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
@@ -199,36 +288,82 @@ FastProjection::FastProjection(FastProjection&&) noexcept = default;
 FastProjection& FastProjection::operator=(FastProjection&&) noexcept = default;
 
 ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t) {
-  Impl& s = *impl_;
-  s.fixed_places = s.map.fixed_places(t);
-  for (int p = 0; p < s.places(); ++p) s.targets.col(p) = s.rows.place[p].target(t);
-  s.strain_lambda.setZero();
-  s.place_lambda.setZero();
-  s.strain_impulse.setZero();
+  impl_->begin(t);
+  return impl_->iterate(x, false);
+}
 
-  ProjectionReport report;
-  double best = std::numeric_limits<double>::infinity();
-  int waited = 0;
-  while (true) {
-    s.measure(x, report);
-    if (s.size() == 0 || (report.converged && report.iterations >= s.options.min_iterations)) break;
-    if (report.iterations >= s.options.max_iterations) break;
-    const double excess = std::max(report.strain_violation / std::max(s.options.tolerance, 1e-30),
-                                   report.place_violation / std::max(s.options.place_tolerance, 1e-30));
-    if (!std::isfinite(excess)) break;
-    waited = excess < least_gain * best ? 0 : waited + 1;
-    best = std::min(best, excess);
-    if (waited >= patience) break;
-    if (!s.factorise(report)) break;
-    s.correct(x);
-    ++report.iterations;
+ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
+                                      const Eigen::Ref<const Eigen::VectorXd>& start, double dt) {
+  Impl& s = *impl_;
+  if (s.options.variant == ProjectionVariant::paper) return project(x, t);
+  s.fixed_places = s.map.fixed_places(t - dt);
+  evaluate(s.composed, start, s.fixed_places, s.tangents);
+  s.begin(t);
+  s.point_along(s.tangents);
+  // What held the state at the start is the first guess: the multipliers that its strains stand for.
+  s.rhs.setZero();
+  for (int r = 0; r < s.strains(); ++r) {
+    if (!s.takes_part(r) || !(s.rows.strain[r].stiffness > 0)) continue;
+    s.compliance[r] = 1 / (s.rows.strain[r].stiffness * dt * dt);
+    s.rhs[r] = s.law(r).multiplier(s.strain(s.tangents, r)) / s.scale[r];
   }
+  s.push(s.rhs, x);
+  return s.iterate(x, true);
+}
+
+ProjectionReport FastProjection::measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
+  ProjectionReport report;
+  impl_->begin(t);
+  impl_->measure(x, report);
   return report;
+}
+
+double FastProjection::energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
+  Impl& s = *impl_;
+  if (s.options.variant == ProjectionVariant::paper) return 0;
+  evaluate(s.composed, x, s.map.fixed_places(t), s.y);
+  return s.limit_energy();
+}
+
+Eigen::VectorXd FastProjection::tensions(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
+  Impl& s = *impl_;
+  Eigen::VectorXd tension = Eigen::VectorXd::Zero(s.strains());
+  if (s.options.variant == ProjectionVariant::paper) return tension;
+  evaluate(s.composed, x, s.map.fixed_places(t), s.y);
+  for (int r = 0; r < s.strains(); ++r)
+    if (s.takes_part(r) && s.rows.strain[r].stiffness > 0)
+      tension[r] = std::max(0.0, s.force_law(r).multiplier(s.strain(s.y, r)));
+  return tension;
+}
+
+void FastProjection::add_tension_stiffness(const Eigen::VectorXd& tensions, const Eigen::Ref<const Eigen::VectorXd>& dx,
+                                           Eigen::Ref<Eigen::VectorXd> df) const {
+  const CompressedRows& free = impl_->composed.free;
+  for (int r = 0; r < impl_->strains(); ++r) {
+    if (tensions[r] == 0) continue;
+    Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+    for (int e = free.start[r]; e < free.start[r + 1]; ++e) turn += free.value[e] * dx.segment<3>(3 * free.column[e]);
+    turn *= tensions[r];
+    for (int e = free.start[r]; e < free.start[r + 1]; ++e) df.segment<3>(3 * free.column[e]) += free.value[e] * turn;
+  }
 }
 
 const Eigen::VectorXd& FastProjection::strain_multipliers() const { return impl_->strain_lambda; }
 const Eigen::Matrix3Xd& FastProjection::place_multipliers() const { return impl_->place_lambda; }
 const Eigen::Matrix3Xd& FastProjection::strain_impulses() const { return impl_->strain_impulse; }
+ProjectionMemory FastProjection::memory() const {
+  return {impl_->strain_lambda, impl_->place_lambda, impl_->strain_impulse};
+}
+bool FastProjection::restore(const ProjectionMemory& memory) {
+  Impl& s = *impl_;
+  if (memory.strain_multipliers.size() != s.strains() || memory.strain_impulses.cols() != s.strains() ||
+      memory.place_multipliers.cols() != s.places())
+    return false;
+  s.strain_lambda = memory.strain_multipliers;
+  s.place_lambda = memory.place_multipliers;
+  s.strain_impulse = memory.strain_impulses;
+  return true;
+}
 const ConstraintRows& FastProjection::rows() const { return impl_->rows; }
 const ProjectionOptions& FastProjection::options() const { return impl_->options; }
 std::size_t FastProjection::factor_nonzeros() const { return impl_->factor ? impl_->factor->factor_nonzeros() : 0; }

@@ -7,36 +7,54 @@
 
 #include "analysis/affine_map.h"
 #include "analysis/projection/constraint_rows.h"
+#include "analysis/projection/limit_law.h"
 
 namespace toile {
 
+// Where the constraint forces of a step point.
+enum class ProjectionVariant {
+  // Along the constraint gradients at the start of the step, as in SHAKE: second order in time. [Ryckaert et al. 1977]
+  second_order,
+  // Along those of the candidate, renewed in each iteration: the paper's, of first order, damping. [eqs. 31-34]
+  paper,
+};
+
 struct ProjectionOptions {
-  double tolerance = 0.01;        // largest |C| of a strain row that counts as met
+  ProjectionVariant variant = ProjectionVariant::second_order;
+  StrainBand weft = {}, warp = {};  // limits of rows with a stiffness
+  double tolerance = 0.01;        // largest violation of a strain row that counts as met, see ProjectionReport
   double place_tolerance = 1e-9;  // m, of place rows
-  // Added to the unit diagonal of the scaled strain rows. Example 4.1(a) for 0.6 s: without drag the energy never rises above
-  // its start plus work at 1e-3, at the auto step and at 1, 2 and 4 ms; at 1e-4 it rises by 0.5 % of the work of gravity at
-  // the auto step.
+  // Strain rows are solved until C - law(lambda) falls below this part of the band. A rest is energy from nowhere.
+  double residual = 0.001;
+  // Added to the unit diagonal of the scaled strain rows. Dependent rows (an edge between two pins) need it where rows are
+  // hard; where they have a stiffness it only steadies the iteration. 1e-3: example 4.1(a) by the paper's variant gains no
+  // energy at the auto step and at 1, 2 and 4 ms; at 1e-4 it gains 0.5 % of the work of gravity at the auto step.
   double regularisation = 1e-3;
-  // The same for guard rows: rows that the flat cloth can spare, but that hold the trimmed border of a bent one. Left out,
-  // the border stretches; taken like the others, they lock bending across the net. Chosen by the table in
-  // analysis/README.md, "Which rows", which also says how it was measured.
-  double guard_softness = 0.01;
-  int min_iterations = 1;         // projecting at least once a step is smooth in dt
+  int min_iterations = 1;  // projecting at least once a step is smooth in dt
   int max_iterations = 50;
 };
 
 struct ProjectionReport {
-  bool converged = false;         // <=> strain_violation <= tolerance and place_violation <= place_tolerance
+  bool converged = false;       // <=> strain_violation <= tolerance and place_violation <= place_tolerance
   int iterations = 0;
-  double strain_violation = 0;    // largest |C| at the end, guard rows apart
-  double place_violation = 0;     // m
-  int worst_row = -1;             // strain row with the largest |C|
-  double factor_seconds = 0;      // wall time of the numeric factorisations
+  double strain_violation = 0;  // at the end: largest |C|, with slack in the band what C lies outside of it
+  double place_violation = 0;   // m
+  double residual = 0;          // largest |C - law(lambda)| of rows with a stiffness, over the band
+  int worst_row = -1;           // strain row with the largest violation
+  double energy = 0;            // J, of the limit laws at the end
+  double tension = 0;           // 1/s2, largest pull of a row times its inertia: the frequency squared it gives its nodes
+  double factor_seconds = 0;    // wall time of the numeric factorisations
+};
+
+// What the last projection left behind, for reactions: rows and shapes as below.
+struct ProjectionMemory {
+  Eigen::VectorXd strain_multipliers;
+  Eigen::Matrix3Xd place_multipliers, strain_impulses;
 };
 
 //   (1) fixed control points don't move;
-//   (2) linear momentum is kept where nothing is pinned, and every iteration's impulse has no moment about the places
-//       it started from (angular momentum);
+//   (2) linear momentum is kept where nothing is pinned; a step's impulse has no moment about the places where its
+//       directions were taken (angular momentum);
 //   (3) pattern analysed once, in the constructor;
 //   (4) a strain row that touches only fixed control points takes no part and counts in no violation.
 class FastProjection {
@@ -48,18 +66,36 @@ class FastProjection {
   FastProjection(FastProjection&&) noexcept;
   FastProjection& operator=(FastProjection&&) noexcept;
 
-  // Corrects x (free nodes) at time t: M (x_after - x_before) = -sum over iterations of J^T d lambda. Iterates until the
+  // Corrects x (free nodes) at time t onto C = 0 along the gradients at x, all rows hard. Iterates until the
   // tolerances are met, `max_iterations` are spent, or fifteen iterations in a row gain nothing (constraints that
   // contradict each other; going on would only pile up multipliers).
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t);
+
+  // The same for the candidate x of a step from the state `start` at t - dt. Rows with a stiffness obey their law, with
+  // compliance 1 / (stiffness dt^2): M (x_after - x_before) = -J^T lambda, C(x_after) = law(lambda).
+  ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>& start, double dt);
 
   // Sum over the last projection's iterations of the multipliers, per row [kg m2 for strain rows, kg m for place rows]:
   // divided by dt^2 they are the constraint forces' quadrature weights [N m, N].
   const Eigen::VectorXd& strain_multipliers() const;
   const Eigen::Matrix3Xd& place_multipliers() const;
-  // Multiplier times tangent, summed over the iterations with the tangents of each [kg m]: control point I was pushed by
-  // -d_I times its column. What a reaction needs; lambda y at the end differs from it by the move of the last step.
+  // Multiplier times direction, summed over the iterations [kg m]: control point I was pushed by -d_I times its column.
   const Eigen::Matrix3Xd& strain_impulses() const;
+  // All three, and putting them back where a run is taken up again; false where their sizes are of other rows.
+  ProjectionMemory memory() const;
+  bool restore(const ProjectionMemory& memory);
+
+  // How far x is from the constraints, nothing moved.
+  ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t);
+
+  // Energy [J] of the limit laws at x, and their pull [N m] on each row there: 0 where pushed, without stiffness, or in
+  // the paper's variant, which treats the pull implicitly.
+  double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t);
+  Eigen::VectorXd tensions(const Eigen::Ref<const Eigen::VectorXd>& x, double t);
+  // df += (sum of tension d^T d) dx over free nodes: what those pulls add to the stiffness against turning.
+  void add_tension_stiffness(const Eigen::VectorXd& tensions, const Eigen::Ref<const Eigen::VectorXd>& dx,
+                             Eigen::Ref<Eigen::VectorXd> df) const;
+
   const ConstraintRows& rows() const;
   const ProjectionOptions& options() const;
   std::size_t factor_nonzeros() const;

@@ -8,12 +8,13 @@ namespace {
 
 // Greville abscissae that no knot line stands for, counted by span, then spread evenly over their span. Each knot line
 // in turn takes the nearest one left, measured in spans.
-std::vector<double> border_lines(const KnotVector& knots) {
+std::vector<double> border_lines(const KnotVector& knots, bool closed) {
   const std::vector<double> breaks = knots.breaks();
   std::vector<double> lines;
   if (knots.degree() <= 2) {
     for (std::size_t k = 1; k + 1 < breaks.size(); ++k)
       if (knots.multiplicity(breaks[k]) >= knots.degree()) lines.push_back(0.5 * (breaks[k - 1] + breaks[k]));
+    if (closed) lines.push_back(0.5 * (breaks[breaks.size() - 2] + breaks.back()));
     return lines;
   }
   const auto cell_of = [&](double u) {
@@ -58,15 +59,16 @@ std::vector<Line> merged(const std::vector<double>& breaks, const std::vector<do
 }  // namespace
 
 std::vector<ConstraintPoint> points_for_degree(const TrimmedSurface& surface, const TrimTopology& topology,
-                                               PointRule rule) {
+                                               PointRule rule, const Closure& closure) {
   const KnotVector& u = surface.surface.u();
   const KnotVector& v = surface.surface.v();
   std::vector<ConstraintPoint> points;
   if (rule == PointRule::knot_mesh) return points;
-  const auto extra = [&](const KnotVector& knots) {
-    return rule == PointRule::border ? border_lines(knots) : middles(knots);
+  const auto extra = [&](const KnotVector& knots, bool closed) {
+    return rule == PointRule::border ? border_lines(knots, closed) : middles(knots);
   };
-  const std::vector<Line> lines_u = merged(topology.mesh.u, extra(u)), lines_v = merged(topology.mesh.v, extra(v));
+  const std::vector<Line> lines_u = merged(topology.mesh.u, extra(u, closure.u)),
+                          lines_v = merged(topology.mesh.v, extra(v, closure.v));
   for (const Line& b : lines_v)
     for (const Line& a : lines_u) {
       if (a.knot && b.knot) continue;
@@ -78,6 +80,31 @@ std::vector<ConstraintPoint> points_for_degree(const TrimmedSurface& surface, co
       points.push_back(point);
     }
   return points;
+}
+
+void merge_over_seams(const NurbsSurface& surface, const Closure& closure, std::vector<ConstraintPoint>& points,
+                      double distance) {
+  for (const Direction d : {Direction::u, Direction::v}) {
+    if (!closure.in(d)) continue;
+    const bool is_u = d == Direction::u;
+    const Interval domain = surface.knots(d).domain();
+    const KnotVector& along = surface.knots(is_u ? Direction::v : Direction::u);
+    const auto across_of = [&](const ConstraintPoint& p) { return is_u ? p.u : p.v; };
+    const auto along_of = [&](const ConstraintPoint& p) { return is_u ? p.v : p.u; };
+    std::vector<double> first;  // places along the seam that the domain's start lists
+    for (const ConstraintPoint& p : points)
+      if (p.used && across_of(p) == domain.min) first.push_back(along_of(p));
+    std::ranges::sort(first);
+    for (ConstraintPoint& p : points) {
+      if (!p.used || across_of(p) != domain.max) continue;
+      const int span = along.find_span(along_of(p));
+      const double near = distance * (along[span + 1] - along[span]);
+      const auto twin = std::ranges::lower_bound(first, along_of(p) - near);
+      if (twin == first.end() || *twin > along_of(p) + near) continue;
+      p.used = false;
+      p.why = "merged";
+    }
+  }
 }
 
 }  // namespace toile

@@ -8,6 +8,7 @@
 
 #include <vector>
 
+#include "geometry/closure.h"
 #include "trimming/constraint_points.h"
 
 namespace toile {
@@ -18,7 +19,7 @@ enum class PointRule {
   half,       // every half of every span
   // As many lines more per direction as control points outnumber knot lines, in the spans whose Greville abscissae are
   // furthest from knots: on uniform knots at p = 3 the middles of the first and the last span. At p = 2 the middle of
-  // the span before each C0 line.
+  // the span before each C0 line, the seam of a closed surface included.
   border,
 };
 
@@ -26,6 +27,11 @@ enum class PointRule {
 // of kind vertex, since the projection treats them alike, but no part of the list that `toile inspect` shows. Smooth
 // panels of degree 2 get none by PointRule::border.
 std::vector<ConstraintPoint> points_for_degree(const TrimmedSurface& surface, const TrimTopology& topology,
-                                               PointRule rule = PointRule::border);
+                                               PointRule rule = PointRule::border, const Closure& closure = {});
+
+// A seam's points are listed on both of its sides. Of two that are one place of the cloth, within `distance` of a cell
+// along the seam, the one at the domain's end is marked used = false, "merged".
+void merge_over_seams(const NurbsSurface& surface, const Closure& closure, std::vector<ConstraintPoint>& points,
+                      double distance = 0.05);
 
 }  // namespace toile

@@ -108,7 +108,14 @@ KinkStrip make_kink_strip(const ShellPanel& panel, int panel_number, int first_c
   const KnotVector& along = rest.knots(is_u ? Direction::v : Direction::u);
   const std::vector<int> spans = across.spans(), spans_along = along.spans();
   const auto after = std::ranges::find(spans, across.find_span(point.at));
-  const int span_after = *after, span_before = *(after - 1), span_along = along.find_span(point.along);
+  const int span_along = along.find_span(point.along);
+  struct Side {
+    int span;
+    double at;
+  };
+  const bool seam = after == spans.begin();
+  const Side before_line{seam ? spans.back() : *(after - 1), seam ? across.domain().max : point.at};
+  const Side after_line{*after, point.at};
 
   KinkStrip strip;
   strip.panel = panel_number;
@@ -119,16 +126,18 @@ KinkStrip make_kink_strip(const ShellPanel& panel, int panel_number, int first_c
 
   std::map<int, std::array<double, 3>> rows;
   double narrower = 0;
-  for (const int span : {span_before, span_after}) {
+  for (const Side* side : {&before_line, &after_line}) {
+    const int span = side->span;
+    const bool is_after = side == &after_line;
     MaterialBasis basis;
-    evaluate_material_basis(panel, is_u ? span : span_along, is_u ? span_along : span, is_u ? point.at : point.along,
-                            is_u ? point.along : point.at, basis);
+    evaluate_material_basis(panel, is_u ? span : span_along, is_u ? span_along : span, is_u ? side->at : point.along,
+                            is_u ? point.along : side->at, basis);
     const Eigen::Matrix2d J = basis.chain.inverse();  // d(X1, X2) / d(u, v)
     const Eigen::Vector2d line = J.col(is_u ? 1 : 0), away = J.col(is_u ? 0 : 1), t = line.normalized();
     Eigen::Vector2d n(t.y(), -t.x());
     if (n.dot(away) < 0) n = -n;
     const double cell = n.dot(away) * (across[span + 1] - across[span]);
-    narrower = span == span_before ? cell : std::min(narrower, cell);
+    narrower = is_after ? std::min(narrower, cell) : cell;
     strip.length = point.weight * line.norm();
     strip.weft = n.x() * n.x();
     strip.warp = n.y() * n.y();
@@ -138,8 +147,8 @@ KinkStrip make_kink_strip(const ShellPanel& panel, int panel_number, int first_c
         const int k = a + basis.count_u * b;
         const double d1 = basis.value[1][k], d2 = basis.value[2][k];
         auto& row = rows[first_control_point + rest.index(basis.first_u + a, basis.first_v + b)];
-        if (span == span_after) row[0] = t.x() * d1 + t.y() * d2;
-        row[span == span_before ? 1 : 2] = n.x() * d1 + n.y() * d2;
+        if (is_after) row[0] = t.x() * d1 + t.y() * d2;
+        row[is_after ? 2 : 1] = n.x() * d1 + n.y() * d2;
       }
   }
   strip.width = strip_width * narrower;

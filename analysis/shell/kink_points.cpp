@@ -11,7 +11,8 @@ constexpr double beside = 1e-6;
 
 }  // namespace
 
-std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopology& topology) {
+std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopology& topology,
+                                   const Closure& closure) {
   std::vector<KinkPoint> points;
   for (const Direction d : {Direction::u, Direction::v}) {
     const bool is_u = d == Direction::u;
@@ -19,13 +20,19 @@ std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopo
     const std::vector<double>& lines = is_u ? topology.mesh.u : topology.mesh.v;
     const std::vector<double>& across = is_u ? topology.mesh.v : topology.mesh.u;
     const GaussRule& rule = gauss_rule(surface.surface.knots(is_u ? Direction::v : Direction::u).degree() + 1);
-    for (std::size_t k = 1; k + 1 < lines.size(); ++k) {
-      if (knots.multiplicity(lines[k]) < knots.degree()) continue;
+    const std::size_t last = lines.size() - 1;
+    for (std::size_t k = closure.in(d) ? 0 : 1; k < last; ++k) {
+      const bool seam = k == 0;
+      if (!seam && knots.multiplicity(lines[k]) < knots.degree()) continue;
       std::vector<double> ends = across;
-      for (const TrimEvent& event : topology.events)
-        if ((is_u ? event.line_u : event.line_v) == static_cast<int>(k)) ends.push_back(event.uv[is_u ? 1 : 0]);
+      for (const TrimEvent& event : topology.events) {
+        const int line = is_u ? event.line_u : event.line_v;
+        if (line == static_cast<int>(k) || (seam && line == static_cast<int>(last)))
+          ends.push_back(event.uv[is_u ? 1 : 0]);
+      }
       std::ranges::sort(ends);
-      const double before = lines[k] - beside * (lines[k] - lines[k - 1]);
+      const std::size_t from = seam ? last : k;
+      const double before = lines[from] - beside * (lines[from] - lines[from - 1]);
       const double after = lines[k] + beside * (lines[k + 1] - lines[k]);
       for (std::size_t e = 0; e + 1 < ends.size(); ++e) {
         const double middle = 0.5 * (ends[e] + ends[e + 1]);

@@ -9,19 +9,23 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "geometry/closure.h"
 #include "trimming/topology.h"
 
 namespace toile {
 
 // A quadrature point on a kink: the line `direction` = `at` (direction u: u = at), at the other parameter `along`;
-// `weight` is a length of that parameter.
+// `weight` is a length of that parameter. At the start of the domain the line is the seam of a closed surface, and the
+// side before it lies at the domain's end.
 struct KinkPoint {
   Direction direction = Direction::u;
   double at = 0, along = 0, weight = 0;
 };
 
-// Gauss points on the interior knot lines of multiplicity >= degree, as far as the cloth lies on both sides.
-std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopology& topology);
+// Gauss points on the interior knot lines of multiplicity >= degree and on the seams of a closed surface, as far as the
+// cloth lies on both sides.
+std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopology& topology,
+                                   const Closure& closure = {});
 
 // Width of the strip as part of the narrower neighbouring cell: a line makes the cloth softer by this part of a cell,
 // and where bending bounds the step, the bound falls to about a third. (analysis/README.md)

@@ -30,7 +30,9 @@ void evaluate_material_basis(const ShellPanel& panel, int span_u, int span_v, do
     throw GeometryError("panel " + panel.name + ": the surface has no tangent plane at u = " + std::to_string(u) +
                         ", v = " + std::to_string(v));
 
-  const Eigen::Vector3d along_u = A1.normalized(), across = (normal / out.jacobian).cross(along_u);
+  const Eigen::Vector3d a3 = normal / out.jacobian;
+  const Eigen::Vector3d u_direction = panel.straight_u ? *panel.straight_u - panel.straight_u->dot(a3) * a3 : A1;
+  const Eigen::Vector3d along_u = u_direction.normalized(), across = a3.cross(along_u);
   const Eigen::Vector3d E1 = std::cos(panel.grain) * along_u + std::sin(panel.grain) * across;
   const Eigen::Vector3d E2 = std::cos(panel.grain) * across - std::sin(panel.grain) * along_u;
   Eigen::Matrix2d J;  // eq. (5)

@@ -9,6 +9,7 @@
 #include "analysis/shell/lanes.h"
 #include "analysis/shell/material_basis.h"
 #include "analysis/shell/point_kernel.h"
+#include "analysis/workers.h"
 #include "geometry/error.h"
 
 namespace toile {
@@ -73,16 +74,20 @@ inline void gather(const CellGroup& group, const PanelLayout& layout, int functi
   }
 }
 
-// Lane by lane: lanes may share control points, and the order of the sums must not depend on anything but the groups.
-inline void scatter_subtract(const CellGroup& group, const PanelLayout& layout, int functions, const LocalNet& net,
-                             double* force) {
+// Hands every lane's every function on: put(control point, its row of `net`). Lane by lane: lanes may share control
+// points, and the order of the sums must not depend on anything but the groups.
+template <class Put>
+inline void scatter(const CellGroup& group, const PanelLayout& layout, const LocalNet& net, Put&& put) {
   for (int l = 0; l < group.lanes; ++l)
-    for (int k = 0; k < functions; ++k) {
-      double* point = force + 3 * static_cast<std::ptrdiff_t>(group.first[l] + layout.offset[k]);
-      point[0] -= net[k].x[l];
-      point[1] -= net[k].y[l];
-      point[2] -= net[k].z[l];
-    }
+    for (int k = 0; k < layout.functions(); ++k)
+      put(group.first[l] + layout.offset[k], net[k].x[l], net[k].y[l], net[k].z[l]);
+}
+
+inline void subtract(double* force, int control_point, double x, double y, double z) {
+  double* point = force + 3 * static_cast<std::ptrdiff_t>(control_point);
+  point[0] -= x;
+  point[1] -= y;
+  point[2] -= z;
 }
 
 inline void add_scaled(LaneVec& sum, Lanes s, const LaneVec& a) {
@@ -290,10 +295,10 @@ void sweep(const CellGroup& group, const PanelLayout& layout, const Pack* table,
                 : sweep_full<0>(group, layout, table, nets, out, point);
 }
 
-PointEnergy<Lanes> add_group_force(const CellGroup& group, const PanelLayout& layout, const Pack* table,
-                                   const double* q, double* force) {
+// Compiled once: a second copy might round otherwise.
+[[gnu::noinline]] PointEnergy<Lanes> group_gradient(const CellGroup& group, const PanelLayout& layout,
+                                                    const Pack* table, const double* q, LocalNet& gradient) {
   std::array<LocalNet, 1> net;
-  LocalNet gradient;
   gather(group, layout, layout.functions(), q, net[0]);
   PointEnergy<Lanes> total{};
   sweep(group, layout, table, net, gradient, [&](const PointHeader& header, const auto& jets) {
@@ -303,27 +308,24 @@ PointEnergy<Lanes> add_group_force(const CellGroup& group, const PanelLayout& la
     total.bending += header.weight * energy.bending;
     return g;
   });
-  scatter_subtract(group, layout, layout.functions(), gradient, force);
   return total;
 }
 
-// Like add_group_force for minus the tangent; the parts of dq . K dq of every lane are returned. `minus_df` may be
-// null.
-PointEnergy<Lanes> add_group_tangent(const CellGroup& group, const PanelLayout& layout, TangentKind kind,
-                                     const Pack* table, const double* q, const double* dq, double* minus_df) {
+// K dq of a group; the parts of dq . K dq of every lane are returned.
+[[gnu::noinline]] PointEnergy<Lanes> group_tangent(const CellGroup& group, const PanelLayout& layout, TangentKind kind,
+                                                   const Pack* table, const double* q, const double* dq,
+                                                   LocalNet& image) {
   std::array<LocalNet, 2> nets;
-  LocalNet gradient;
   gather(group, layout, layout.functions(), q, nets[0]);
   gather(group, layout, layout.functions(), dq, nets[1]);
   PointEnergy<Lanes> total{};
-  sweep(group, layout, table, nets, gradient, [&](const PointHeader& header, const auto& jets) {
+  sweep(group, layout, table, nets, image, [&](const PointHeader& header, const auto& jets) {
     PointJet<Lanes> g;
     const PointEnergy<Lanes> work = energy_hessian(layout.law, kind, jets[0], header.rest, jets[1], g);
     total.membrane += header.weight * work.membrane;
     total.bending += header.weight * work.bending;
     return g;
   });
-  if (minus_df != nullptr) scatter_subtract(group, layout, layout.functions(), gradient, minus_df);
   return total;
 }
 
@@ -362,6 +364,25 @@ std::pair<int, int> tensor_shape(const ShellPanel& panel, const CellRule& cell) 
   return along_u * along_v == cell.count ? std::pair(along_u, along_v) : std::pair(0, 0);
 }
 
+// Groups dealt out to threads, a run of groups to each. Control points of one thread's groups alone are summed in
+// place; for the others every addend is kept, and added after all are there, in the order of the groups. So each sum is
+// that of one thread going through all groups.
+struct SharedWork {
+  struct Part {
+    std::size_t begin = 0, end = 0;  // groups
+    std::vector<int> point;          // control point of each addend that is kept, in order
+    std::vector<double> addend;      // 3 each
+  };
+  explicit SharedWork(int threads) : workers(threads), parts(static_cast<std::size_t>(workers.count())) {}
+  Workers workers;
+  std::vector<Part> parts;
+  std::vector<char> shared;                // per control point
+  std::vector<PointEnergy<Lanes>> energy;  // per group
+};
+
+// Below this many quadrature points starting the threads costs what they save. (README, "Threads")
+constexpr std::size_t least_points_for_threads = 8000;
+
 }  // namespace
 
 struct ShellModel::Impl {
@@ -373,6 +394,7 @@ struct ShellModel::Impl {
   std::vector<KinkStrip> kinks;
   Eigen::VectorXd rest, lumped_mass, lumped_drag;
   std::size_t point_count = 0;
+  std::unique_ptr<SharedWork> work;  // null: one thread
 
   void add_panel(int index);
   void fill(CellGroup& group);
@@ -383,12 +405,91 @@ struct ShellModel::Impl {
     return basis;
   }
 
+  // Subtracts each group's image(group, layout, table, local) from `out`; returns what the images return, summed.
+  template <class Image>
+  PointEnergy<Lanes> subtract_images(double* out, const Image& image) const;
+  void share(int threads);
+
   // Calls body(group, layout, table) for every group in order.
   template <class Body>
   void for_each_group(Body&& body) const {
     for (const CellGroup& group : groups) body(group, layouts[group.panel], tables.data() + group.table);
   }
 };
+
+template <class Image>
+PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& image) const {
+  PointEnergy<Lanes> total{};
+  const auto add = [&](const PointEnergy<Lanes>& part) {
+    total.membrane += part.membrane;
+    total.bending += part.bending;
+  };
+  if (!work) {
+    for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
+      LocalNet local;
+      add(image(group, layout, table, local));
+      scatter(group, layout, local, [&](int point, double x, double y, double z) { subtract(out, point, x, y, z); });
+    });
+    return total;
+  }
+  SharedWork& w = *work;
+  const auto body = [&](int index) {
+    SharedWork::Part& part = w.parts[static_cast<std::size_t>(index)];
+    double* kept = part.addend.data();
+    for (std::size_t g = part.begin; g < part.end; ++g) {
+      const CellGroup& group = groups[g];
+      LocalNet local;
+      w.energy[g] = image(group, layouts[group.panel], tables.data() + group.table, local);
+      scatter(group, layouts[group.panel], local, [&](int point, double x, double y, double z) {
+        if (!w.shared[point]) return subtract(out, point, x, y, z);
+        kept[0] = x, kept[1] = y, kept[2] = z;
+        kept += 3;
+      });
+    }
+  };
+  w.workers.run(body);
+  for (const SharedWork::Part& part : w.parts)
+    for (std::size_t k = 0; k < part.point.size(); ++k)
+      subtract(out, part.point[k], part.addend[3 * k], part.addend[3 * k + 1], part.addend[3 * k + 2]);
+  for (const PointEnergy<Lanes>& energy : w.energy) add(energy);
+  return total;
+}
+
+void ShellModel::Impl::share(int threads) {
+  work.reset();
+  if (threads < 2 || point_count < least_points_for_threads) return;
+  work = std::make_unique<SharedWork>(threads);
+  threads = work->workers.count();
+  work->energy.resize(groups.size());
+  const auto cost = [&](const CellGroup& group) {
+    return static_cast<double>(group.points) * layouts[group.panel].functions();
+  };
+  double total = 0, before = 0;
+  for (const CellGroup& group : groups) total += cost(group);
+  std::size_t next = 0;
+  std::vector<int> owner(static_cast<std::size_t>(first.back()), -1);
+  work->shared.assign(owner.size(), 0);
+  const LocalNet none{};
+  for (int p = 0; p < threads; ++p) {
+    SharedWork::Part& part = work->parts[static_cast<std::size_t>(p)];
+    part.begin = next;
+    for (; next < groups.size() && (p + 1 == threads || before < total * (p + 1) / threads); ++next) {
+      before += cost(groups[next]);
+      scatter(groups[next], layouts[groups[next].panel], none, [&](int point, double, double, double) {
+        if (owner[point] >= 0 && owner[point] != p) work->shared[point] = 1;
+        owner[point] = p;
+      });
+    }
+    part.end = next;
+  }
+  for (SharedWork::Part& part : work->parts) {
+    for (std::size_t g = part.begin; g < part.end; ++g)
+      scatter(groups[g], layouts[groups[g].panel], none, [&](int point, double, double, double) {
+        if (work->shared[point]) part.point.push_back(point);
+      });
+    part.addend.resize(3 * part.point.size());
+  }
+}
 
 void ShellModel::Impl::add_panel(int index) {
   const std::vector<CellRule>& cells = panels[index].quadrature.cells;
@@ -513,6 +614,9 @@ const Eigen::VectorXd& ShellModel::lumped_mass() const {
 const Eigen::VectorXd& ShellModel::lumped_drag() const {
   return impl_->lumped_drag;
 }
+void ShellModel::use_threads(int count) {
+  impl_->share(count);
+}
 std::size_t ShellModel::quadrature_points() const {
   return impl_->point_count;
 }
@@ -524,12 +628,10 @@ ShellEnergy ShellModel::internal_force(const Eigen::Ref<const Eigen::VectorXd>& 
                                        Eigen::Ref<Eigen::VectorXd> force) const {
   assert(q.size() == impl_->rest.size() && force.size() == q.size());
   force.setZero();
-  PointEnergy<Lanes> total{};
-  impl_->for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
-    const auto part = add_group_force(group, layout, table, q.data(), force.data());
-    total.membrane += part.membrane;
-    total.bending += part.bending;
-  });
+  const PointEnergy<Lanes> total = impl_->subtract_images(
+      force.data(), [&](const CellGroup& group, const PanelLayout& layout, const Pack* table, LocalNet& local) {
+        return group_gradient(group, layout, table, q.data(), local);
+      });
   double strips = 0;
   for (const KinkStrip& strip : impl_->kinks)
     strips += add_kink_force(strip, impl_->layouts[strip.panel].law, q.data(), force.data());
@@ -540,9 +642,10 @@ void ShellModel::apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const
                                Eigen::Ref<Eigen::VectorXd> df, TangentKind kind) const {
   assert(q.size() == impl_->rest.size() && dq.size() == q.size() && df.size() == q.size());
   df.setZero();
-  impl_->for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
-    add_group_tangent(group, layout, kind, table, q.data(), dq.data(), df.data());
-  });
+  impl_->subtract_images(df.data(),
+                         [&](const CellGroup& group, const PanelLayout& layout, const Pack* table, LocalNet& local) {
+                           return group_tangent(group, layout, kind, table, q.data(), dq.data(), local);
+                         });
   for (const KinkStrip& strip : impl_->kinks)
     add_kink_tangent(strip, impl_->layouts[strip.panel].law, q.data(), dq.data(), df.data());
   df = -df;
@@ -553,7 +656,8 @@ ShellModel::CellShare ShellModel::stiffest_cell(const Eigen::Ref<const Eigen::Ve
   CellShare best;
   double largest = -1;
   impl_->for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
-    const auto work = add_group_tangent(group, layout, TangentKind::upper, table, q.data(), dq.data(), nullptr);
+    LocalNet ignored;
+    const auto work = group_tangent(group, layout, TangentKind::upper, table, q.data(), dq.data(), ignored);
     for (int l = 0; l < group.lanes; ++l) {
       if (!(work.membrane[l] + work.bending[l] > largest)) continue;
       largest = work.membrane[l] + work.bending[l];

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,13 +19,15 @@
 namespace toile {
 
 // One panel, SI, in the scene's axes. `rest` is unstrained; its directions weft (turned by grain from the u direction
-// within the tangent plane, counter-clockwise seen against the normal) and warp carry eqs. (8) and (9).
+// within the tangent plane, counter-clockwise seen against the normal) and warp carry eqs. (8) and (9). The u direction
+// is `straight_u`, projected, where that is set: threads of a flat panel are straight however its net is skewed.
 struct ShellPanel {
   std::string name;
   NurbsSurface rest;
   CutQuadrature quadrature;
   Fabric fabric;
   double grain = 0;  // rad
+  std::optional<Eigen::Vector3d> straight_u = {};  // unit; unset: d rest / du of each point
   // On C0 knot lines, see kink_points(); without them the cloth bends there for nothing.
   std::vector<KinkPoint> kinks = {};
 };
@@ -92,6 +95,11 @@ class ShellModel {
   };
   CellShare stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q,
                           const Eigen::Ref<const Eigen::VectorXd>& dq) const;
+
+  // Forces and tangents by this many threads from now on: the same bits, as every sum keeps its order, but one caller
+  // at a time. Models of fewer than 8000 quadrature points stay on the caller's thread, which is faster. 1: no
+  // threads.
+  void use_threads(int count);
 
   std::size_t quadrature_points() const;
   std::size_t table_bytes() const;  // memory of the stored functions

@@ -100,6 +100,7 @@ FileSurface plane_patch(const Frame& f, const Eigen::AlignedBox2d& reach) {
   out.surface = NurbsSurface(KnotVector(1, {a.x(), a.x(), b.x(), b.x()}), KnotVector(1, {a.y(), a.y(), b.y(), b.y()}),
                              std::move(points));
   out.how = "plane as B-spline surface";
+  out.plane = f;
   return out;
 }
 
@@ -136,7 +137,7 @@ FileSurface to_surface(const Analytic& s, const Frame& f, Interval height) {
       if (sphere) flat(0, 0) = flat(0, flat.cols() - 1) = 0;  // the poles lie on the axis
       Eigen::Matrix3Xd points = (f.x * flat.row(0) + f.z * flat.row(1)).colwise() + f.origin;
       profile = Curve3(arc.knots(), std::move(points), arc.weights());
-      profile_turns = {{angle, sphere ? 2 : 4}};
+      profile_turns = {{angle, sphere ? 2 : 4, angle.length()}};
       out.how = sphere ? "sphere" : "torus";
       break;
     }
@@ -147,7 +148,7 @@ FileSurface to_surface(const Analytic& s, const Frame& f, Interval height) {
   out.surface = transposed(revolved(profile, f.origin, f.z, {0, 2 * pi}));
   // The standard counts degrees, and a cone's second parameter along its axis; exporters use radians and the slant too.
   out.maps.clear();
-  const AxisMap turn{1, 0, {{{0, 2 * pi}, 4}}}, along{1, 0, profile_turns};
+  const AxisMap turn{1, 0, {{{0, 2 * pi}, 4, 2 * pi}}}, along{1, 0, profile_turns};
   for (const double cosine : slant == 1 ? std::vector<double>{1} : std::vector<double>{1, slant})
     for (const double unit : {degree, 1.0}) {
       ParameterMap map{turn, along};

@@ -1,5 +1,6 @@
 // Entity 126, rational B-spline curve. [IGES 5.3, 4.23]
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -61,6 +62,21 @@ SplineCurve read_spline_curve(Parameters& in) {
   Eigen::Matrix3Xd points(3, count);
   for (int i = 0; i < count; ++i)
     for (int axis = 0; axis < 3; ++axis) points(axis, i) = in.real("coordinate of control point", i);
+  const std::vector<int> dropped = drop_surplus(degree, knots, [&](int a, int b) {
+    return points.col(a) == points.col(b) &&
+           (weights.empty() || weights[static_cast<std::size_t>(a)] == weights[static_cast<std::size_t>(b)]);
+  });
+  if (!dropped.empty()) {
+    in.note("surplus knots 126", "a knot occurs more often than the degree; " + std::to_string(dropped.size()) +
+                                 " control points that it makes idle are left out");
+    for (auto i = dropped.rbegin(); i != dropped.rend(); ++i) {
+      const Eigen::Index rest = points.cols() - 1 - *i;
+      points.middleCols(*i, rest) = points.rightCols(rest).eval();
+      points.conservativeResize(3, points.cols() - 1);
+      if (!weights.empty()) weights.erase(weights.begin() + *i);
+    }
+    if (std::all_of(weights.begin(), weights.end(), [](double w) { return w == 1; })) weights.clear();
+  }
   try {
     SplineCurve out;
     out.curve = Curve3(KnotVector(degree, std::move(knots)), std::move(points), std::move(weights));

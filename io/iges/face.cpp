@@ -18,6 +18,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+constexpr double believable = 1e-2;  // of the surface's size: model curves further off it bound something else
 constexpr double usable = 1e-3;  // of the domain; gaps and excursions beyond it are refused by validation
 
 Vector2d first(const TrimCurve& c) {
@@ -117,43 +118,51 @@ class FaceMaker {
     options_.note(kind, b.place + what);
   }
 
-  // A point of the surface under a parameter that may lie a period away.
+  // A point of the surface under a parameter that may lie a period away. Beyond an open border the polynomial goes on.
   Vector3d at(Vector2d uv) const {
     for (int k = 0; k < 2; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      if (closed_[i] && !domain_[i].contains(uv[k]))
-        uv[k] -= period_[i] * std::floor((uv[k] - domain_[i].min) / period_[i]);
+      if (!closed_[i] || domain_[i].contains(uv[k])) continue;
+      uv[k] -= period_[i] * std::floor((uv[k] - domain_[i].min) / period_[i]);
       uv[k] = std::clamp(uv[k], domain_[i].min, domain_[i].max);
     }
     return s_(uv.x(), uv.y());
   }
 
-  // How far a boundary's parameter curves, mapped, lie from its model curves: at ends of curves that are paired, else
-  // between each joint and the nearest end of a model curve.
+  // How far a boundary's parameter curves, mapped, lie from its model curves: ends and middles of curves that are paired,
+  // else starts and middles against the nearest model curve.
   double disagreement(const BoundaryCurves& b, const ParameterMap& map) const {
     double largest = 0;
+    const auto image = [&](const Curve3& c, double f) {
+      return at(map(c(c.domain().min + f * c.domain().length()).head<2>()));
+    };
     for (std::size_t i = 0; i < b.parameter.size(); ++i) {
       const Curve3& c = b.parameter[i];
-      const Vector3d start = at(map(c.start().head<2>())), end = at(map(c.end().head<2>()));
+      const Vector3d start = image(c, 0), middle = image(c, 0.5), end = image(c, 1);
       if (b.parameter.size() == b.model.size()) {
         const Curve3& m = b.model[i];
         largest = std::max(largest, std::min(std::max((start - m.start()).norm(), (end - m.end()).norm()),
                                              std::max((start - m.end()).norm(), (end - m.start()).norm())));
+        if ((middle - m(0.5 * (m.domain().min + m.domain().max))).norm() > agreed())
+          largest = std::max(largest, closest_point(m, middle).distance);
         continue;
       }
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const Curve3& m : b.model) nearest = std::min(nearest, closest_point(m, start).distance);
-      largest = std::max(largest, nearest);
+      for (const Vector3d& x : {start, middle}) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (const Curve3& m : b.model) nearest = std::min(nearest, closest_point(m, x).distance);
+        largest = std::max(largest, nearest);
+      }
     }
     return largest;
   }
+  double agreed() const { return std::max(10 * options_.resolution, 1e-4 * size_); }
 
   double extent(const Curve3& c, int k) const { return std::max(std::abs(c.start()[k]), std::abs(c.end()[k])); }
 
   // The standard's reading of the file's parameters, unless another lies nearer to the model curves.
   const ParameterMap& best_map() const {
     if (file_.maps.size() == 1) return file_.maps[0];
-    const ParameterMap* best = nullptr;
+    const ParameterMap* best = &file_.maps[0];
     double least = std::numeric_limits<double>::infinity();
     bool seen = false;
     for (const ParameterMap& map : file_.maps) {
@@ -177,24 +186,34 @@ class FaceMaker {
   }
 
   // Each curve's direction, and its period where the surface is closed, so that it begins where the one before it ends.
+  // Ends that meet as they stand go before ends that meet a period apart.
   void chain(std::vector<TrimCurve>& curves) const {
-    const auto gap = [&](const Vector2d& a, const Vector2d& b) {
+    const auto gap = [&](const Vector2d& a, const Vector2d& b, bool across) {
       Vector2d d = b - a;
       for (int k = 0; k < 2; ++k) {
         const auto i = static_cast<std::size_t>(k);
-        if (closed_[i]) d[k] -= period_[i] * std::round(d[k] / period_[i]);
+        if (across && closed_[i]) d[k] -= period_[i] * std::round(d[k] / period_[i]);
         d[k] /= domain_[i].length();
       }
       return d.norm();
     };
+    const auto turn_to_meet = [&](TrimCurve& c, auto&& distance) {
+      for (const bool across : {false, true}) {
+        if (distance(c, across) <= usable) return;
+        c.reversed = !c.reversed;
+        if (distance(c, across) <= usable) return;
+        c.reversed = !c.reversed;
+      }
+    };
     const std::size_t n = curves.size();
     if (n > 1) {
-      const auto reach = [&](const Vector2d& x) { return std::min(gap(x, first(curves[1])), gap(x, last(curves[1]))); };
-      if (reach(last(curves[0])) > usable && reach(first(curves[0])) <= usable) curves[0].reversed = true;
+      turn_to_meet(curves[0], [&](const TrimCurve& c, bool across) {
+        return std::min(gap(last(c), first(curves[1]), across), gap(last(c), last(curves[1]), across));
+      });
     }
     for (std::size_t i = 1; i < n; ++i) {
       const Vector2d x = last(curves[i - 1]);
-      if (gap(x, first(curves[i])) > usable && gap(x, last(curves[i])) <= usable) curves[i].reversed = true;
+      turn_to_meet(curves[i], [&](const TrimCurve& c, bool across) { return gap(x, first(c), across); });
       const Vector2d d = x - first(curves[i]);
       for (int k = 0; k < 2; ++k)
         if (const double period = period_[static_cast<std::size_t>(k)]; period > 0)
@@ -295,7 +314,7 @@ class FaceMaker {
   Pulled pulled(std::vector<Curve3> model, std::optional<Vector2d> start) const {
     Pulled out;
     chain(model);
-    const std::optional<AffinePatch> patch = affine_patch(s_, 1e-9 * size_);
+    const std::optional<AffinePatch> patch = file_.plane ? std::nullopt : affine_patch(s_, 1e-9 * size_);
     Eigen::Matrix<double, 2, 3> inverse;
     if (patch) {
       Eigen::Matrix<double, 3, 2> map;
@@ -304,6 +323,16 @@ class FaceMaker {
     }
     std::vector<Curve2> flat;
     for (const Curve3& m : model) {
+      if (file_.plane) {
+        Curve2::Points points(2, m.points().cols());
+        for (Eigen::Index i = 0; i < points.cols(); ++i) {
+          const Vector3d x = file_.plane->local(m.points().col(i));
+          points.col(i) = x.head<2>();
+          if (std::abs(x.z()) > out.distance) out.distance = std::abs(x.z()), out.place = m.points().col(i);
+        }
+        flat.emplace_back(m.knots(), std::move(points), m.weights());
+        continue;
+      }
       if (patch) {
         // The inverse map on the control points is exact.
         flat.emplace_back(m.knots(), Curve2::Points(inverse * (m.points().colwise() - patch->origin)), m.weights());
@@ -316,6 +345,7 @@ class FaceMaker {
       }
       PullBackOptions options;
       options.snap = snap_;
+      options.max_distance = believable;
       options.start = start;
       PulledCurve c = pull_back(s_, m, options);
       start = c.curve.end();
@@ -369,7 +399,7 @@ class FaceMaker {
       if (fit.excursion > usable) trouble = "its parameter curves leave the domain by " + format_real(fit.excursion);
       if (!b.model.empty()) {
         off = disagreement(b, *map_);
-        if (trouble.empty() && off > std::max({10 * options_.resolution, 1e-4 * size_}))
+        if (trouble.empty() && off > agreed())
           trouble = "its parameter curves lie " + format_real(off) + " from its model curves";
         if (b.model.size() != b.parameter.size())
           note(b, "segment counts",
@@ -393,13 +423,15 @@ class FaceMaker {
       const Fit old = own.empty() ? Fit{1, 1} : fit_of(own);
       const bool better =
           std::max(fit.gap, fit.excursion) < std::max(old.gap, old.excursion) || (fit.good() && p.distance < 0.5 * off);
-      if (p.distance <= 1e-2 * size_ && (better || own.empty())) {
+      if (p.distance <= believable * size_ && (better || own.empty())) {
         note(b, "pulled back",
-             trouble + "; its model curves are pulled back onto the surface, to " + format_real(p.error) +
+             trouble + "; its model curves are pulled back onto the surface, " +
+                 (p.error > 0 ? "off by " + format_real(p.error) : std::string("exactly")) +
                  (p.distance > std::max(options_.resolution, 1e-9 * size_)
                       ? "; they lie " + format_real(p.distance) + " off it"
                       : std::string()));
-        b.converted = "parameter curves pulled back from the model curves, off by " + format_real(p.error) +
+        b.converted = "parameter curves pulled back from the model curves, " +
+                      (p.error > 0 ? "off by " + format_real(p.error) : std::string("exactly")) +
                       ", the model curves lying " + format_real(p.distance) + " off the surface";
         return std::move(p.curves);
       }

@@ -50,6 +50,7 @@ FileSurface to_surface(const OffsetSurface& offset, const FileSurface& base, dou
   const Eigen::Vector3d middle = normal(s, 0.5 * (u.min + u.max), 0.5 * (v.min + v.max));
   if (middle.dot(offset.indicator) < 0) distance = -distance;
   FileSurface out = base;
+  out.plane.reset();
   const double size = (s.points().rowwise().maxCoeff() - s.points().rowwise().minCoeff()).norm();
   if (affine_patch(s, 1e-12 * size)) {
     out.surface = s.with_points(s.points().colwise() + distance * middle);
@@ -96,7 +97,7 @@ FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, double toler
                         "), must be 1 or 2");
   if (!(offset.normal.norm() > 0)) throw GeometryError("the offset's normal has no length");
   const Eigen::Vector3d z = offset.normal.normalized();
-  const auto [d1, t1, d2, t2] = offset.distances;
+  const double d1 = offset.distances[0], t1 = offset.distances[1], d2 = offset.distances[2], t2 = offset.distances[3];
   const Interval domain = base.domain();
   const bool by_length = offset.kind == 1;
   if (offset.flag == 2 && !(t2 != t1)) throw GeometryError("the offset's two distances stand at one parameter");

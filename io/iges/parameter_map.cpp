@@ -19,12 +19,13 @@ const Turn* turn_at(const AxisMap& map, double x) {
 
 // On an arc of half angle h the rational quadratic's parameter is tan(angle / 2) / tan(h / 2), counted from the middle.
 struct ArcPlace {
-  double middle, half;
+  double middle, half;      // of the arc, in the parameter
+  double rate, half_angle;  // angle for each unit of the parameter
 };
 ArcPlace arc_place(const Turn& turn, double x) {
   const double width = turn.range.length() / turn.arcs;
   const double k = std::floor((x - turn.range.min) / width);
-  return {turn.range.min + (k + 0.5) * width, 0.5 * width};
+  return {turn.range.min + (k + 0.5) * width, 0.5 * width, turn.sweep / turn.range.length(), 0.5 * turn.sweep / turn.arcs};
 }
 
 }  // namespace
@@ -34,7 +35,7 @@ double AxisMap::operator()(double x) const {
   const Turn* turn = turn_at(*this, x);
   if (!turn || x == turn->range.min || x == turn->range.max) return x;
   const ArcPlace arc = arc_place(*turn, x);
-  return arc.middle + arc.half * std::tan(0.5 * (x - arc.middle)) / std::tan(0.5 * arc.half);
+  return arc.middle + arc.half * std::tan(0.5 * arc.rate * (x - arc.middle)) / std::tan(0.5 * arc.half_angle);
 }
 
 double AxisMap::derivative(double x) const {
@@ -42,8 +43,8 @@ double AxisMap::derivative(double x) const {
   const Turn* turn = turn_at(*this, x);
   if (!turn) return scale;
   const ArcPlace arc = arc_place(*turn, x);
-  const double c = std::cos(0.5 * (x - arc.middle));
-  return scale * 0.5 * arc.half / (std::tan(0.5 * arc.half) * c * c);
+  const double c = std::cos(0.5 * arc.rate * (x - arc.middle));
+  return scale * 0.5 * arc.rate * arc.half / (std::tan(0.5 * arc.half_angle) * c * c);
 }
 
 CarriedCurve carried(const Curve2& curve, const ParameterMap& map, const Eigen::Vector2d& tolerance) {

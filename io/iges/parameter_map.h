@@ -13,8 +13,9 @@ namespace toile::iges {
 //   (1) Continuous and increasing for scale > 0; C1 within a turn.
 //   (2) A lone turn goes on beyond its range, by further arcs of its kind.
 struct Turn {
-  Interval range;  // of the angle; the NURBS' knots are the same numbers
+  Interval range;    // in both parameters alike
   int arcs = 1;
+  double sweep = 0;  // angle over the range [rad]
 };
 struct AxisMap {
   double scale = 1, shift = 0;

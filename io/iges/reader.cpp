@@ -49,7 +49,8 @@ class Reader {
 
   Frame analytic_frame(const Entry& e, const Analytic& s);
   FileSurface surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name, int depth = 0);
-  FileSurface own_surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name, int depth);
+  FileSurface own_surface(const Entry& e, const Eigen::Affine3d& t, const std::vector<BoundaryCurves>& boundaries,
+                          std::string& name, int depth);
 
   BoundaryCurves curve_on_surface(const Entry& e, int surface);
   BoundaryCurves boundary_list(const Entry& e, int surface);
@@ -64,6 +65,7 @@ class Reader {
   void mark(const Entry& e, Disposition disposition, std::string why = {});
   void quarantine(const Entry& e, const std::string& why);
   void find_used_surfaces(std::set<int>& used);
+  bool endless(const Entry& e) const;
   void finish_names();
   bool holds_faces() const;
   void read_outlines();
@@ -241,7 +243,7 @@ NaturalCurve Reader::natural_curve(const Entry& e, int depth) {
       Parameters in(file_, e);
       const Interval angles = arc_angles(read_arc(in));
       out.curve = with_domain(out.curve, angles);
-      out.turns = {{angles, (out.curve.knots().control_point_count() - 1) / 2}};
+      out.turns = {{angles, (out.curve.knots().control_point_count() - 1) / 2, angles.length()}};
     }
     return out;  // the transformation is in it
   }
@@ -269,7 +271,6 @@ Frame Reader::analytic_frame(const Entry& e, const Analytic& s) {
 
 // Boundary curves seen from the surface's own definition space.
 std::vector<BoundaryCurves> seen_from(const Eigen::Affine3d& t, const std::vector<BoundaryCurves>& boundaries) {
-  if (is_identity(t)) return boundaries;
   const Eigen::Affine3d back = t.inverse();
   std::vector<BoundaryCurves> out = boundaries;
   for (BoundaryCurves& b : out)
@@ -277,8 +278,10 @@ std::vector<BoundaryCurves> seen_from(const Eigen::Affine3d& t, const std::vecto
   return out;
 }
 
-FileSurface Reader::own_surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name,
-                                int depth) {
+// The surface before its own matrix `t`, and the boundaries alike; but planes are placed at once, so that their corners and
+// their boundaries' parameters are the same numbers.
+FileSurface Reader::own_surface(const Entry& e, const Eigen::Affine3d& t, const std::vector<BoundaryCurves>& boundaries,
+                                std::string& name, int depth) {
   if (depth > max_depth) throw InputError(file_.place(e) + "its surfaces form a cycle");
   const bool trimmed = !boundaries.empty();
   spend(e);
@@ -299,7 +302,7 @@ FileSurface Reader::own_surface(const Entry& e, const std::vector<BoundaryCurves
   };
   switch (e.type) {
     case 108: {
-      const Frame f = frame(read_plane(in));
+      const Frame f = frame(read_plane(in)).placed(t);
       name = name_property(in);
       const Eigen::AlignedBox3d box = extent(f);
       if (box.isEmpty()) in.fail("a plane without a boundary has no end");
@@ -312,7 +315,8 @@ FileSurface Reader::own_surface(const Entry& e, const std::vector<BoundaryCurves
     case 198: {
       const Analytic s = read_analytic(in);
       name = name_property(in);
-      const Frame f = analytic_frame(e, s);
+      Frame f = analytic_frame(e, s);
+      if (e.type == 190) f = f.placed(t);
       const Eigen::AlignedBox3d box = extent(f);
       if (e.type < 196 && box.isEmpty()) in.fail("a surface without a boundary has no end");
       if (e.type == 190) return plane_patch(f, {box.min().head<2>(), box.max().head<2>()});
@@ -377,20 +381,21 @@ FileSurface Reader::own_surface(const Entry& e, const std::vector<BoundaryCurves
   return out;
 }
 
-FileSurface Reader::surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name,
-                            int depth) {
+FileSurface Reader::surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name, int depth) {
   const Eigen::Affine3d t = transform(e);
+  const bool as_they_are = e.type == 108 || e.type == 128 || e.type == 190 || is_identity(t);
   FileSurface out;
   try {
-    out = own_surface(e, e.type == 128 || is_identity(t) ? boundaries : seen_from(t, boundaries), name, depth);
+    out = own_surface(e, t, as_they_are ? boundaries : seen_from(t, boundaries), name, depth);
   } catch (const GeometryError& error) {
     throw InputError(file_.place(e) + error.what());
   }
-  if (!is_identity(t)) out.surface = out.surface.with_points(t * out.surface.points());
+  if (!is_identity(t) && !out.plane) out.surface = out.surface.with_points(t * out.surface.points());
   std::string how = out.how;
   if (out.error > 0) how += ", off by " + format_real(out.error);
   if (out.error > 0) note(e, "fitted surface", how);
-  mark(e, how.empty() ? Disposition::read : Disposition::converted, std::move(how));
+  const Disposition disposition = how.empty() ? Disposition::read : Disposition::converted;
+  mark(e, disposition, std::move(how));
   return out;
 }
 
@@ -683,6 +688,14 @@ void Reader::find_used_surfaces(std::set<int>& used) {
   }
 }
 
+// An offset of a plane, a cylinder or a cone has no end of its own.
+bool Reader::endless(const Entry& e) const {
+  const Entry* base = &e;
+  for (int depth = 0; base && base->type == 140 && depth <= max_depth; ++depth)
+    base = file_.find(nth_integer(file_, *base, 5).value_or(0));
+  return base && (base->type == 108 || base->type == 190 || base->type == 192 || base->type == 194);
+}
+
 // Faces, surfaces that nobody uses, and what holds such.
 void Reader::expand(const Entry& e, const Eigen::Affine3d& placement, int depth, std::vector<Job>& jobs) {
   if (depth > max_depth) throw InputError(file_.place(e) + "its instances form a cycle");
@@ -694,7 +707,7 @@ void Reader::expand(const Entry& e, const Eigen::Affine3d& placement, int depth,
     case 122:
     case 128:
     case 140:
-      if (used_surfaces_.count(e.sequence) != 0) return;
+      if (used_surfaces_.count(e.sequence) != 0 || endless(e)) return;
       [[fallthrough]];
     case 143:
     case 144:

@@ -32,7 +32,9 @@ std::string replayed(const File& file, const Entry& e) {
   if (regular) return std::string(file.record(e));
   Tokens tokens;
   tokenize(file.record(e), file.delimiters, tokens);
-  Record record(e.type, file.delimiters);
+  // Also where the record says another type than its entry: it stays as wrong as it was.
+  const std::optional<int> type = tokens.list.empty() ? std::nullopt : parse_integer(tokens.list[0].text);
+  Record record(type.value_or(0), file.delimiters);
   for (std::size_t i = 1; i < tokens.list.size(); ++i) record.token(tokens.list[i]);
   return record.finish();
 }

@@ -1,4 +1,5 @@
 // Entity 128, rational B-spline surface. [IGES 5.3, 4.24]
+#include <algorithm>
 #include <string>
 
 #include "geometry/error.h"
@@ -8,6 +9,43 @@
 #include "io/iges/surfaces.h"
 
 namespace toile::iges {
+
+namespace {
+
+void drop_surplus_rows(Parameters& in, int m1, int m2, std::vector<double>& knots_u, std::vector<double>& knots_v,
+                  std::vector<double>& weights, Eigen::Matrix3Xd& points) {
+  const int n1 = static_cast<int>(knots_u.size()) - m1 - 1, n2 = static_cast<int>(knots_v.size()) - m2 - 1;
+  const auto same = [&](int i, int j) {
+    return points.col(i) == points.col(j) &&
+           (weights.empty() || weights[static_cast<std::size_t>(i)] == weights[static_cast<std::size_t>(j)]);
+  };
+  const std::vector<int> columns = drop_surplus(m1, knots_u, [&](int a, int b) {
+    for (int j = 0; j < n2; ++j)
+      if (!same(a + n1 * j, b + n1 * j)) return false;
+    return true;
+  });
+  const std::vector<int> rows = drop_surplus(m2, knots_v, [&](int a, int b) {
+    for (int i = 0; i < n1; ++i)
+      if (!same(i + n1 * a, i + n1 * b)) return false;
+    return true;
+  });
+  if (columns.empty() && rows.empty()) return;
+  in.note("surplus knots 128", "a knot occurs more often than the degree; " + std::to_string(columns.size() + rows.size()) +
+                               " rows of control points that it makes idle are left out");
+  std::vector<int> kept;
+  for (int j = 0; j < n2; ++j)
+    for (int i = 0; i < n1; ++i)
+      if (!std::binary_search(columns.begin(), columns.end(), i) && !std::binary_search(rows.begin(), rows.end(), j))
+        kept.push_back(i + n1 * j);
+  points = points(Eigen::all, kept).eval();
+  if (weights.empty()) return;
+  std::vector<double> left;
+  for (const int k : kept) left.push_back(weights[static_cast<std::size_t>(k)]);
+  const bool plain = std::all_of(left.begin(), left.end(), [](double w) { return w == 1; });
+  weights = plain ? std::vector<double>() : std::move(left);
+}
+
+}  // namespace
 
 SplineSurface read_spline_surface(Parameters& in) {
   const int k1 = in.integer("K1"), k2 = in.integer("K2");
@@ -32,6 +70,7 @@ SplineSurface read_spline_surface(Parameters& in) {
   Eigen::Matrix3Xd points(3, count);
   for (int i = 0; i < count; ++i)
     for (int axis = 0; axis < 3; ++axis) points(axis, i) = in.real("coordinate of control point", i);
+  drop_surplus_rows(in, m1, m2, knots_u, knots_v, weights, points);
   try {
     SplineSurface out;
     out.surface = NurbsSurface(KnotVector(m1, std::move(knots_u)), KnotVector(m2, std::move(knots_v)),

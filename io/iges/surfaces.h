@@ -22,13 +22,26 @@ struct NaturalCurve {
 // One after the other, domains added up; the pieces' ends must meet within `tolerance` (else GeometryError).
 NaturalCurve joined(const std::vector<NaturalCurve>& pieces, double tolerance);
 
+// Where the surface stands: z is the plane's normal or the axis, x the reference direction made perpendicular to it.
+struct Frame {
+  Eigen::Vector3d origin{0, 0, 0}, x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
+  Eigen::Vector3d local(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d d = p - origin;
+    return {d.dot(x), d.dot(y), d.dot(z)};
+  }
+  Frame placed(const Eigen::Affine3d& t) const {
+    return {t * origin, t.linear() * x, t.linear() * y, t.linear() * z};
+  }
+};
+
 // What a surface of the file became. Several `maps`: exporters disagree (degrees or radians); the first is the
 // standard's.
 struct FileSurface {
   NurbsSurface surface;
   std::vector<ParameterMap> maps = {{}};
   double error = 0;  // of a surface that no NURBS is exactly
-  std::string how;   // empty: the file's own numbers
+  std::string how;    // empty: the file's own numbers
+  std::optional<Frame> plane = {};  // of a plane: its parameters are x and y there
 };
 
 // 118: straight rulings between two curves, u along both, v from the first (0) to the second (1).
@@ -105,14 +118,6 @@ struct Analytic {
 Analytic read_analytic(Parameters& in);
 void write(const Analytic& surface, Record& out);
 
-// Where the surface stands: z is the plane's normal or the axis, x the reference direction made perpendicular to it.
-struct Frame {
-  Eigen::Vector3d origin{0, 0, 0}, x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
-  Eigen::Vector3d local(const Eigen::Vector3d& p) const {
-    const Eigen::Vector3d d = p - origin;
-    return {d.dot(x), d.dot(y), d.dot(z)};
-  }
-};
 // Throws GeometryError for directions of no length.
 Frame frame(const Eigen::Vector3d& origin, const Eigen::Vector3d& axis,
             const std::optional<Eigen::Vector3d>& reference);

@@ -1,6 +1,7 @@
 // Entities 118 (ruled surface), 120 (surface of revolution), 122 (tabulated cylinder). [IGES 5.3, 4.17, 4.18, 4.19]
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "geometry/error.h"
@@ -40,7 +41,7 @@ NaturalCurve joined(const std::vector<NaturalCurve>& pieces, double tolerance) {
       weights.push_back(ratio * c.weight(i));
     }
     for (const Turn& turn : piece.turns)
-      out.turns.push_back({{turn.range.min + shift, turn.range.max + shift}, turn.arcs});
+      out.turns.push_back({{turn.range.min + shift, turn.range.max + shift}, turn.arcs, turn.sweep});
     at += own.length();
   }
   Eigen::Matrix3Xd net(3, static_cast<Eigen::Index>(points.size()));
@@ -62,14 +63,16 @@ UnitCurve over_unit(const NaturalCurve& c) {
   UnitCurve out{with_domain(clamp(c.curve), {0, 1}), {}};
   for (const Turn& turn : c.turns)
     out.map.turns.push_back(
-        {{(turn.range.min - d.min) / d.length(), (turn.range.max - d.min) / d.length()}, turn.arcs});
+        {{(turn.range.min - d.min) / d.length(), (turn.range.max - d.min) / d.length()},
+                              turn.arcs,
+                              turn.sweep});
   return out;
 }
 
 bool same(const std::vector<Turn>& a, const std::vector<Turn>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Turn& x, const Turn& y) {
     return std::abs(x.range.min - y.range.min) <= 1e-12 && std::abs(x.range.max - y.range.max) <= 1e-12 &&
-           x.arcs == y.arcs;
+           x.arcs == y.arcs && std::abs(x.sweep - y.sweep) <= 1e-12;
   });
 }
 
@@ -109,11 +112,18 @@ class ArcLength {
     for (std::size_t i = 0; i + 1 < breaks.size(); ++i)
       for (int k = 1; k <= 16; ++k) {
         t_.push_back(k == 16 ? breaks[i + 1] : breaks[i] + (breaks[i + 1] - breaks[i]) * k / 16);
-        s_.push_back(s_.back() + arc_length(curve, {t_[t_.size() - 2], t_.back()}));
+        s_.push_back(s_.back() + arc_length(curve, {t_[t_.size() - 2], t_.back()}, tolerance));
       }
     if (!(s_.back() > 0)) throw GeometryError("a curve of the ruled surface has no length");
   }
-  double parameter(double fraction) const {
+  double parameter(double fraction) {
+    const auto [known, added] = known_.try_emplace(fraction, 0.0);
+    if (added) known->second = find(fraction);
+    return known->second;
+  }
+
+ private:
+  double find(double fraction) const {
     const double s = fraction * s_.back();
     const auto above = static_cast<std::size_t>(std::lower_bound(s_.begin(), s_.end(), s) - s_.begin());
     if (above == 0) return t_.front();
@@ -123,16 +133,17 @@ class ArcLength {
     for (int k = 0; k < 20; ++k) {
       const double speed = evaluate(curve_, t).d1.norm();
       if (!(speed > 0)) break;
-      const double step = (s - s_[above - 1] - arc_length(curve_, {a, t})) / speed;
+      const double step = (s - s_[above - 1] - arc_length(curve_, {a, t}, tolerance)) / speed;
       t = std::clamp(t + step, a, b);
-      if (std::abs(step) <= 1e-14 * (b - a)) break;
+      if (std::abs(step) <= 1e-12 * (b - a)) break;
     }
     return t;
   }
 
- private:
+  static constexpr double tolerance = 1e-9;  // far below what files resolve
   const Curve3& curve_;
   std::vector<double> t_, s_;
+  std::map<double, double> known_;  // a fit asks for the same fractions again and again
 };
 
 bool constant_speed(const NaturalCurve& c) {
@@ -188,7 +199,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
     length_a.emplace(a.curve);
     length_b.emplace(b.curve);
   }
-  const auto at = [](const UnitCurve& curve, const std::optional<ArcLength>& length, double u) {
+  const auto at = [](const UnitCurve& curve, std::optional<ArcLength>& length, double u) {
     return curve.curve(length ? length->parameter(u) : curve.map(u));
   };
   std::vector<FitBreak> breaks{{0, 0}, {1, 0}};
@@ -201,7 +212,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
   }
   const SurfaceFit fit = fit_surface(
       [&](double u, double v) -> Eigen::Vector3d { return (1 - v) * at(a, length_a, u) + v * at(b, length_b, u); },
-      breaks, {{0, 0}, {1, 0}}, tolerance);
+      breaks, {{0, 0}, {1, 0}}, tolerance, by_length ? 64 : 128);
   out.surface = fit.surface;
   out.error = fit.error;
   return out;
@@ -262,7 +273,7 @@ FileSurface to_surface(const Revolution& revolution, const Curve3& axis, const N
   out.surface = revolved(clamp(generatrix.curve), axis.start(), direction, angle);
   out.maps[0].u.turns = generatrix.turns;
   const int arcs = (out.surface.count_v() - 1) / 2;
-  out.maps[0].v.turns = {{angle, arcs}};
+  out.maps[0].v.turns = {{angle, arcs, angle.length()}};
   out.how = "surface of revolution as rational B-spline surface";
   return out;
 }

@@ -1,7 +1,6 @@
 // Drafts every panel file of the samples with the library itself: make_panels DIR writes DIR/<sample>/<panel>.igs.
 // The tests compare what it writes with what is committed.
 #include <Eigen/LU>
-#include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -94,8 +93,8 @@ TrimmedSurface skirt_panel() {
   };
   // The hem as one cubic that meets the seams' ends and the circle's lowest point.
   const double pull = hem * 4.0 / 3.0 * std::tan(std::numbers::pi / 8);
-  const Curve2 hem_curve = cubic(hem * left, hem * left + pull * Vector2d(s, -s), hem * right + pull * Vector2d(-s, -s),
-                                 hem * right);
+  const Curve2 hem_curve =
+      cubic(hem * left, hem * left + pull * Vector2d(s, -s), hem * right + pull * Vector2d(-s, -s), hem * right);
   // The waist as a rational quadratic arc, run from right to left.
   Eigen::Matrix2Xd arc(2, 3);
   arc << waist * right, Vector2d(0, -waist / s), waist * left;
@@ -104,8 +103,8 @@ TrimmedSurface skirt_panel() {
                  outer_loop({hem_curve, seam(right, out, true), waist_curve, seam(left, out_left, false)}));
 }
 
-// The 1 m square of example 4.1 as a trim in a larger surface whose net is turned; e_u, e_v are the net's axes. Curves 0
-// to 3 run from corner (0, 0) counter-clockwise.
+// The 1 m square of example 4.1 as a trim in a larger surface whose net is turned; e_u, e_v are the net's axes. Curves
+// 0 to 3 run from corner (0, 0) counter-clockwise.
 TrimmedSurface square_in(int spans, double size, Vector2d e_u, Vector2d e_v) {
   const Vector2d centre(0.5, 0.5);
   const Vector2d origin = centre - 0.5 * size * (e_u + e_v);
@@ -130,6 +129,92 @@ TrimmedSurface skewed_square(int spans, double shear) {
   return untrimmed(straight.with_points(points));
 }
 
+// A disc as four arcs between the corners (+-a, +-a), each turning by 60 degrees, so that they meet at 150: a round
+// disc has no regular map from a square. As curves from corner (-a, -a) counter-clockwise, in a square of `size`...
+constexpr double disc_corner = 0.21, disc_turn = std::numbers::pi / 3;
+
+TrimmedSurface trimmed_disc(double size) {
+  const double a = disc_corner, apex = a * (1 + std::tan(disc_turn / 2));
+  const std::vector<Vector2d> corners{{-a, -a}, {a, -a}, {a, a}, {-a, a}};
+  const std::vector<Vector2d> apices{{0, -apex}, {apex, 0}, {0, apex}, {-apex, 0}};
+  std::vector<Curve2> arcs;
+  for (std::size_t k = 0; k < 4; ++k) {
+    Eigen::Matrix2Xd points(2, 3);
+    points << corners[k], apices[k], corners[(k + 1) % 4];
+    arcs.emplace_back(uniform_knots(2, 1), points, std::vector<double>{1, std::cos(disc_turn / 2), 1});
+  }
+  const Interval side{-0.5 * size, 0.5 * size};
+  return trimmed(flat(side, side, 2, 1, 1), outer_loop(std::move(arcs)));
+}
+
+// ... and as one rational biquadratic patch on [-1, 1]^2 whose edges are the arcs.
+TrimmedSurface fitted_disc() {
+  const double a = disc_corner, apex = a * (1 + std::tan(disc_turn / 2));
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 9);
+  std::vector<double> weights(9, 1);
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) {
+      const Vector2d at(i - 1, j - 1);
+      const bool corner = at.squaredNorm() > 1, middle = at.isZero(0);
+      points.col(i + 3 * j).head<2>() = (corner ? a : apex) * at;
+      if (!corner && !middle) weights[static_cast<std::size_t>(i + 3 * j)] = std::cos(disc_turn / 2);
+    }
+  }
+  const KnotVector knots = uniform_knots(2, 1, {-1, 1});
+  return untrimmed(NurbsSurface(knots, knots, points, weights));
+}
+
+// The unit square with 8 x 8 elements of which the material fills the first four and `fraction` of the fifth, in u only
+// or in both directions.
+TrimmedSurface cut_square(double fraction, bool both) {
+  const double end = 0.5 + fraction / 8, top = both ? end : 1;
+  return trimmed(flat({0, 1}, {0, 1}, 2, 8, 8), polygon({{0, 0}, {end, 0}, {end, top}, {0, top}}));
+}
+
+// The unit square with one inner control point of weight `weight`.
+TrimmedSurface weighted_square(double weight) {
+  const NurbsSurface plain = flat({0, 1}, {0, 1}, 2, 8, 8);
+  std::vector<double> weights(static_cast<std::size_t>(plain.count_u() * plain.count_v()), 1);
+  weights[static_cast<std::size_t>(plain.index(5, 5))] = weight;
+  return untrimmed(NurbsSurface(plain.u(), plain.v(), plain.points(), weights));
+}
+
+// The unit square with elements from 0.25e-6 to 0.25 in both directions.
+TrimmedSurface uneven_square() {
+  const KnotVector knots(2, {0, 0, 0, 0.25, 0.5, 0.5 + 0.25e-6, 0.75, 1, 1, 1});
+  return untrimmed(rebuild({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, knots, knots));
+}
+
+// A triangle: the unit square with its edge v = 1 drawn together.
+TrimmedSurface collapsed_square() {
+  const NurbsSurface square = flat({0, 1}, {0, 1}, 2, 4, 4);
+  Eigen::Matrix3Xd points = square.points();
+  for (Eigen::Index k = 0; k < points.cols(); ++k) points(0, k) = 0.5 + (points(0, k) - 0.5) * (1 - points(1, k));
+  return untrimmed(square.with_points(points));
+}
+
+void write_study_panels(const std::filesystem::path& out) {
+  write(out / "studies/cantilever/strip.igs", untrimmed(flat({0, 0.2}, {0, 0.02}, 1, 1, 1)), "strip", 1, "M");
+  write(out / "studies/disc/trimmed.igs", trimmed_disc(0.7), "disc", 1, "M");
+  write(out / "studies/disc/fitted.igs", fitted_disc(), "disc", 1, "M");
+  const std::filesystem::path stability = out / "stability/panels";
+  for (int k = 1; k <= 4; ++k) {
+    write(stability / ("aspect_1e" + std::to_string(k) + ".igs"),
+          untrimmed(flat({0, 1}, {0, std::pow(10.0, -k)}, 1, 1, 1)), "cloth", 1, "M");
+  }
+  for (const int k : {1, 3, 6, 9, 12}) {
+    const double fraction = std::pow(10.0, -k);
+    write(stability / ("cut_1e-" + std::to_string(k) + ".igs"), cut_square(fraction, false), "cloth", 1, "M");
+    write(stability / ("cut_both_1e-" + std::to_string(k) + ".igs"), cut_square(fraction, true), "cloth", 1, "M");
+  }
+  write(stability / "weight_1e-4.igs", weighted_square(1e-4), "cloth", 1, "M");
+  write(stability / "weight_1e4.igs", weighted_square(1e4), "cloth", 1, "M");
+  write(stability / "uneven.igs", uneven_square(), "cloth", 1, "M");
+  write(stability / "collapsed.igs", collapsed_square(), "cloth", 1, "M");
+  write(stability / "millimetre.igs", untrimmed(flat({0, 1}, {0, 1}, 1, 1, 1)), "cloth", mm, "MM");
+  write(stability / "hundred_metres.igs", untrimmed(flat({0, 100}, {0, 100}, 1, 1, 1)), "cloth", 1, "M");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -149,6 +234,7 @@ int main(int argc, char** argv) {
     write(out / "grid_independence/parallelogram.igs",
           square_in(14, 1.75, {1, 0}, {std::sin(std::numbers::pi / 12), std::cos(std::numbers::pi / 12)}), "cloth", 1,
           "M");
+    write_study_panels(out);
   } catch (const Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -53,7 +53,9 @@ Swing swing(const TrimmedSurface& face, PointRule rule) {
   system.loads.force.resize(rest.size());
   for (int i = 0; i < model.control_point_count(); ++i)
     system.loads.force.segment<3>(3 * i) << 0, 0, -9.81 * model.lumped_mass()[i];
-  FastProjection projection(map, system.node_mass, {select_rows(model, map, system.node_mass, points, {}), {}});
+  std::vector<StrainRow> rows = select_rows(model, map, model.lumped_mass(), points, {});
+  for (StrainRow& row : rows) row.stiffness = 1170 * row.area;  // k / rho = 1e4 m2/s2
+  FastProjection projection(map, system.node_mass, {rows, {}});
   system.projection = &projection;
   DynamicState state;
   state.x = map.restrict(rest);

@@ -232,5 +232,78 @@ TEST(FastProjection, RefusesPinsOnFixedControlPointsAndNodesWithoutMass) {
   EXPECT_THROW(FastProjection(map, mass, {vertex_rows(c), {}}), SolverError);
 }
 
+TEST(LimitLaw, StrainAndMultiplierAreInversesAndTheEnergyIsTheIntegral) {
+  for (const double slack : {0.0, 0.9}) {
+    const LimitLaw law({.stretch = 0.02, .compress = 0.05, .slack = slack}, 3e-4);
+    for (const double part : {-0.99, -0.95, -0.92, -0.3, 0.3, 0.92, 0.95, 0.99}) {
+      const double strain = part * (part < 0 ? 0.05 : 0.02);
+      if (std::abs(part) <= slack) {
+        EXPECT_EQ(law.multiplier(strain), 0);
+        EXPECT_EQ(law.energy(strain), 0);
+        EXPECT_TRUE(law.slack_at(strain));
+        continue;
+      }
+      if (std::abs(part) > slack + 0.98 * (1 - slack)) continue;  // the wall itself
+      const double lambda = law.multiplier(strain), h = 1e-6 * std::abs(lambda), d = 1e-7 * std::abs(strain);
+      expect_near_rel(law.strain(lambda), strain, 1e-12);
+      expect_near_rel(law.slope(lambda), (law.strain(lambda + h) - law.strain(lambda - h)) / (2 * h), 1e-5);
+      expect_near_rel((law.energy(strain + d) - law.energy(strain - d)) / (2 * d), lambda, 1e-5);
+    }
+    for (const double lambda : {1e3, 1e9}) {
+      EXPECT_LT(law.strain(lambda), 0.02);
+      EXPECT_GT(law.strain(-lambda), -0.05);
+    }
+  }
+}
+
+ConstraintRows with_stiffness(const FlatCloth& c, double stiffness) {
+  ConstraintRows rows{vertex_rows(c), {}};
+  for (StrainRow& row : rows.strain) row.stiffness = stiffness / ((c.n - 2) * (c.n - 2));
+  return rows;
+}
+
+TEST(FastProjection, AStepSolvesTheLimitLawAlongTheGradientsOfItsStart) {
+  const FlatCloth c = flat_cloth(2, 8);
+  const double dt = 1e-3;
+  FastProjection projection(free_map(c), c.mass, with_stiffness(c, 1e4), {.residual = 1e-9});
+  const Eigen::VectorXd candidate = disturbed(c.rest, 1e-3, 7);
+  Eigen::VectorXd x = candidate, impulse = Eigen::VectorXd::Zero(x.size());
+  const ProjectionReport report = projection.step(x, dt, c.rest, dt);
+  EXPECT_TRUE(report.converged);
+  const auto& rows = projection.rows().strain;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const double lambda = projection.strain_multipliers()[r];
+    const LimitLaw law({}, 1 / (rows[r].stiffness * dt * dt));
+    expect_near_rel(strain(rows[r].row, x), law.strain(lambda), 1e-6, 1e-10);
+    Eigen::Vector3d y = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < rows[r].row.index.size(); ++k)
+      y += rows[r].row.value[k] * c.rest.segment<3>(3 * rows[r].row.index[k]);
+    for (std::size_t k = 0; k < rows[r].row.index.size(); ++k)
+      impulse.segment<3>(3 * rows[r].row.index[k]) -= lambda * rows[r].row.value[k] * y;
+  }
+  for (int k = 0; k < c.mass.size(); ++k)
+    for (int a = 0; a < 3; ++a)
+      expect_near_rel(c.mass[k] * (x - candidate)[3 * k + a], impulse[3 * k + a], 1e-9, 1e-15);
+}
+
+TEST(FastProjection, ABandLeavesTheClothAloneInsideAndHoldsItAtItsEnds) {
+  const FlatCloth c = flat_cloth(2, 8);
+  const StrainBand wide{.stretch = 0.05, .compress = 0.02, .slack = 0.9};
+  FastProjection projection(free_map(c), c.mass, with_stiffness(c, 1e4),
+                            {.weft = wide, .warp = wide, .tolerance = 1e-4});
+  Eigen::VectorXd inside = 1.02 * c.rest;  // E = 0.0202
+  const Eigen::VectorXd before = inside;
+  EXPECT_TRUE(projection.step(inside, 1e-3, inside, 1e-3).converged);
+  EXPECT_EQ(inside, before);
+  for (const double factor : {1.1, 0.9}) {
+    Eigen::VectorXd x = factor * c.rest;
+    EXPECT_TRUE(projection.step(x, 1e-3, c.rest, 1e-3).converged) << factor;
+    for (const StrainRow& row : projection.rows().strain) {
+      EXPECT_LE(strain(row.row, x), 0.05 + 1e-4);
+      EXPECT_GE(strain(row.row, x), -0.02 - 1e-4);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace toile

@@ -355,5 +355,33 @@ TEST(ShellModel, CellsOfUnequalRulesAddUp) {
   EXPECT_LT((fc - fa - fb).norm(), 1e-13 * fc.norm());
 }
 
+TEST(Shell, ThreadsGiveTheSameBits) {
+  for (const int degree : {2, 3}) {
+    for (const bool rational : {false, true}) {
+      // Two panels, so that threads meet in the middle of one, and material that cuts cells.
+      ShellPanel whole = test::make_panel(test::bumpy_surface(degree, 40, 30, rational), stiff_fabric(0.01));
+      ShellPanel cut = test::make_panel(test::bumpy_surface(degree, 20, 17, false), stiff_fabric());
+      cut.quadrature = test::tensor_quadrature(cut.rest, {Interval{-0.7, 1.63}, Interval{0.03, 0.41}});
+      ShellModel model({whole, cut});
+      const Eigen::Index n = model.rest().size();
+      const Eigen::VectorXd q = model.rest() + 0.01 * Random(5).vector(n), dq = Random(6).vector(n);
+      Eigen::VectorXd force(n), image(n), same(n);
+      const ShellEnergy energy = model.internal_force(q, force);
+      model.apply_tangent(q, dq, image);
+      for (const int threads : {2, 3, 7, 1}) {
+        model.use_threads(threads);
+        for (int repeat = 0; repeat < 3; ++repeat) {
+          const ShellEnergy again = model.internal_force(q, same);
+          EXPECT_EQ(same, force) << threads << " threads, degree " << degree;
+          EXPECT_EQ(again.membrane, energy.membrane);
+          EXPECT_EQ(again.bending, energy.bending);
+          model.apply_tangent(q, dq, same);
+          EXPECT_EQ(same, image) << threads << " threads, degree " << degree;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace toile

@@ -31,6 +31,7 @@ struct Scene {
     bool limits = true;
     bool gravity = true;
     ProjectionOptions projection = {};
+    double stiffness = 1170;            // N/m, of the strain limit: ten weights of a square metre at 1 % strain
   };
 
   explicit Scene(const Options& o)
@@ -60,7 +61,8 @@ struct Scene {
         points[0].emplace_back();
         points[0].back().u = u, points[0].back().v = v;
       }
-    if (o.limits) rows.strain = strain_rows(model, points);
+    if (o.limits) rows.strain = strain_rows(model, points, model.lumped_mass());
+    for (StrainRow& row : rows.strain) row.stiffness = o.stiffness * row.area;
     for (const Eigen::Vector2d& uv : o.pins) {
       const Eigen::Vector3d place = rest(uv[0], uv[1]);
       rows.place.push_back({place_row(model, 0, uv[0], uv[1]), 0, [place](double) { return place; }});
@@ -113,22 +115,40 @@ TEST(Verlet, DragLeadsToTerminalVelocityAndFollowsTheWind) {
     EXPECT_LT((scene.state.v.segment<3>(3 * k) - terminal).norm(), 1.05 * left * terminal.norm());
 }
 
+// Energy less work in the middle of each step, where the velocity obeys the constraints.
+class Balance {
+ public:
+  double operator()(const StepReport& report) {
+    const double elastic = report.elastic.total() + report.limit_energy;
+    const double work = report.load_work + report.drag_work + report.motion_work;
+    const double balance = report.kinetic + 0.5 * (elastic_ + elastic) - work_ - 0.5 * work;
+    elastic_ = elastic;
+    work_ += work;
+    return balance;
+  }
+
+ private:
+  double elastic_ = 0, work_ = 0;
+};
+
 // The law that redundancy breaks most easily: two pinned corners make the rows of the edge between them dependent.
 TEST(Verlet, EnergyOfAnUndampedProjectedRunNeverRises) {
-  for (double dt : {4e-3, 2e-3, 1e-3}) {
-    Scene scene({.fabric = without_drag(), .fixed = {0, 9}});
-    double work = 0, most_work = 0, highest = 0;
-    for (int k = 0; k < std::lround(1.2 / dt); ++k) {
-      const StepReport report = step(scene.system, scene.state, dt);
-      ASSERT_TRUE(report.finite);
-      ASSERT_TRUE(report.projection.converged) << "at step " << k << ": " << report.projection.strain_violation;
-      work += report.load_work;
-      most_work = std::max(most_work, work);
-      highest = std::max(highest, report.kinetic + report.elastic.total() - work);  // the start is 0
+  for (const ProjectionVariant variant : {ProjectionVariant::second_order, ProjectionVariant::paper})
+    for (double dt : {2e-3, 1e-3, 5e-4}) {
+      Scene scene({.fabric = without_drag(), .fixed = {0, 9}, .projection = {.variant = variant}});
+      Balance balance;
+      double work = 0, most_work = 0, highest = 0;
+      for (int k = 0; k < std::lround(1.2 / dt); ++k) {
+        const StepReport report = step(scene.system, scene.state, dt);
+        ASSERT_TRUE(report.finite);
+        ASSERT_TRUE(report.projection.converged) << "at step " << k << ": " << report.projection.strain_violation;
+        work += report.load_work;
+        most_work = std::max(most_work, work);
+        highest = std::max(highest, balance(report));
+      }
+      EXPECT_GT(most_work, 0.5);
+      EXPECT_LT(highest, 1e-6 * most_work) << dt;
     }
-    EXPECT_GT(most_work, 0.5);
-    EXPECT_LT(highest, 1e-6 * most_work);
-  }
 }
 
 TEST(Verlet, EnergyBalancesWithoutProjectionToSecondOrder) {
@@ -138,12 +158,12 @@ TEST(Verlet, EnergyBalancesWithoutProjectionToSecondOrder) {
     fabric.membrane = {.weft = 200, .warp = 200, .shear = 80};
     fabric.bending.kappa_reg = 3;
     Scene scene({.fabric = fabric, .fixed = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, .limits = false});
-    double balance = 0, worst = 0, scale = 0;
+    Balance balance;
+    double worst = 0, scale = 0;
     for (int k = 0; k < std::lround(0.3 / dt); ++k) {
       const StepReport report = step(scene.system, scene.state, dt);
-      balance += report.load_work + report.drag_work;
       scale += report.load_work;
-      worst = std::max(worst, std::abs(report.kinetic + report.elastic.total() - balance));
+      worst = std::max(worst, std::abs(balance(report)));
     }
     EXPECT_LT(worst, 0.01 * scale);
     if (previous > 0) {
@@ -170,12 +190,12 @@ TEST(Verlet, MovedPinsDoTheWorkThatTheClothTakesUp) {
     Fabric fabric;
     fabric.membrane = {.weft = 200, .warp = 200, .shear = 80};
     Scene scene({.fabric = fabric, .fixed = edge, .motion = motion, .limits = false, .gravity = false});
-    double motion_work = 0, balance = 0, worst = 0;
+    Balance balance;
+    double motion_work = 0, worst = 0;
     for (int k = 0; k < std::lround(0.5 / dt); ++k) {
       const StepReport report = step(scene.system, scene.state, dt);
       motion_work += report.motion_work;
-      balance += report.motion_work + report.drag_work + report.load_work;
-      worst = std::max(worst, std::abs(report.kinetic + report.elastic.total() - balance));
+      worst = std::max(worst, std::abs(balance(report)));
     }
     EXPECT_GT(motion_work, 0.01);
     EXPECT_LT(worst, 0.02 * motion_work);
@@ -186,18 +206,19 @@ TEST(Verlet, MovedPinsDoTheWorkThatTheClothTakesUp) {
   }
 }
 
-// First order up to 20 %, at 0.3 s. Strictly less than half is more than this scene gives: the taut edge between the pins
-// costs order (analysis/README.md, "Regularisation").
-TEST(Verlet, HalvingTheStepAboutHalvesTheChangeOfTheFreeCorner) {
-  std::vector<Eigen::Vector3d> corner;
-  for (double dt : {4e-3, 2e-3, 1e-3, 5e-4}) {
-    Scene scene({.fixed = {0, 9}});
-    run(scene, dt, 0.3);
-    corner.push_back(scene.places().tail<3>());
+// Second order in the directions of the constraint forces; what is left is the damping of the limit's own stiffness, of
+// first order and small, and the chatter of the moment law. The paper's variant is 25 mm off at 4 ms.
+TEST(Verlet, TheFreeCornerIsWithinHalfAMillimetreAtTheLargestStep) {
+  for (double until : {0.3, 0.6}) {
+    std::vector<Eigen::Vector3d> corner;
+    for (double dt : {4e-3, 1e-3, 2.5e-4}) {
+      Scene scene({.fixed = {0, 9}});
+      run(scene, dt, until);
+      corner.push_back(scene.places().tail<3>());
+    }
+    EXPECT_LT((corner[0] - corner[2]).norm(), 6e-4) << until;
+    EXPECT_LT((corner[1] - corner[2]).norm(), 3e-4) << until;
   }
-  const double a = (corner[1] - corner[0]).norm(), b = (corner[2] - corner[1]).norm(), c = (corner[3] - corner[2]).norm();
-  EXPECT_LT(b, 0.6 * a);
-  EXPECT_LT(c, 0.6 * b);
 }
 
 TEST(Verlet, PinsOfAHangingClothCarryItsWeight) {

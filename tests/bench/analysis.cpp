@@ -46,6 +46,18 @@ void shell_force_with_twist(benchmark::State& state) {
 }
 BENCHMARK(shell_force_with_twist)->ArgName("p")->Arg(2)->Arg(3)->Unit(benchmark::kMicrosecond);
 
+void shell_force_by_threads(benchmark::State& state) {
+  ShellBench bench(2, static_cast<int>(state.range(1)));
+  bench.model.use_threads(static_cast<int>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(bench.model.internal_force(bench.q, bench.force));
+  bench.count(state);
+}
+BENCHMARK(shell_force_by_threads)
+    ->ArgNames({"threads", "n"})
+    ->ArgsProduct({{1, 2}, {20, 25, 32, 50, 100, 316}})
+    ->Unit(benchmark::kMicrosecond)
+    ->UseRealTime();
+
 void shell_tangent(benchmark::State& state) {
   ShellBench bench(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
   const Eigen::VectorXd dq = test::Random(2).vector(bench.q.size());

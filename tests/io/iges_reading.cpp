@@ -30,7 +30,7 @@ TEST(IgesReading, EveryFileOfTheCorpusHasPanels) {
         EXPECT_EQ(panel.loops[l].index, static_cast<int>(l));
         for (std::size_t k = 0; k < panel.loops[l].curves.size(); ++k)
           EXPECT_EQ(panel.loops[l].curves[k].index, static_cast<int>(k));
-        EXPECT_LE(panel.loops[l].gap, 1e-12);
+        EXPECT_LE(panel.loops[l].gap, name == "gaps_and_excursions" ? 1e-3 : 1e-12);
       }
     }
   }

@@ -37,6 +37,24 @@ struct Small : Folder {
   }
 };
 
+void expect_same_results(const std::filesystem::path& a, const std::filesystem::path& b) {
+  int compared = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(a)) {
+    if (!entry.is_regular_file()) continue;
+    const auto name = std::filesystem::relative(entry.path(), a);
+    if (name == "run.log" || name == "report.json") continue;
+    EXPECT_EQ(read_file(entry.path()), read_file(b / name)) << name;
+    ++compared;
+  }
+  EXPECT_GT(compared, 20);
+  const auto report = [](const std::filesystem::path& folder) {
+    auto json = nlohmann::json::parse(read_file(folder / "report.json"));
+    for (const char* timing : {"seconds", "counters", "wall_seconds", "wall_seconds_per_frame"}) json.erase(timing);
+    return json;
+  };
+  EXPECT_EQ(report(a), report(b));
+}
+
 TEST(Program, DrapesAndReports) {
   const Small folder("drape");
   const Outcome run = toile(
@@ -68,6 +86,17 @@ TEST(Program, TheSameSceneWritesTheSameFiles) {
     ++compared;
   }
   EXPECT_GT(compared, 5);
+}
+
+TEST(Program, ThreadsGiveTheSameBytes) {
+  const Small folder("threads");
+  const std::string large =
+      "drape scene.toml --set 'output.formats=[\"vtu\", \"iges\", \"obj\"]' --set output.every=0.0025 "
+      "--until 0.005 --set strain_limit.mode=off --set panel.0.refine.control_points=[44,44] ";
+  ASSERT_EQ(toile(folder, large + "-o one").code, 0);
+  ASSERT_EQ(toile(folder, large + "-o two --threads 2").code, 0);
+  expect_same_results(folder / "one", folder / "two");
+  EXPECT_EQ(toile(folder, large + "-o none --threads 0").code, 2);
 }
 
 TEST(Program, APanelFileNeedsNoScene) {
@@ -146,6 +175,53 @@ TEST(Program, AnErrorNamesFileLineAndKey) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
+TEST(Program, AKeyOfAHundredThousandPartsIsAnError) {
+  const Small folder("deep");
+  std::string key = "a";
+  for (int k = 0; k < 100000; ++k) key += ".a";
+  write_file(folder / "deep.toml", "# 1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1\nb = [0.1, 0.2]\n" + key + " = 1\n");
+  const Outcome run = toile(folder, "check deep.toml");
+  EXPECT_EQ(run.code, 3);
+  EXPECT_EQ(run.err, "error: deep.toml:3: a key has more than 16 parts\n");
+  EXPECT_EQ(toile(folder, "check scene.toml --set " + key.substr(0, 100000) + "=1").code, 3);
+  EXPECT_EQ(toile(folder, "check scene.toml --set 'x={" + key.substr(0, 100001) + "=1}'").code, 3);
+}
+
+TEST(Program, AReaderThatGoesAwayDoesNotEndTheRun) {
+  const Small folder("pipe");
+  const std::string command = "cd '" + folder.path().string() +
+                              "' && { '" TOILE_PROGRAM
+                              "' drape scene.toml -v -o result 2>&1; echo $? >code.txt; } | true";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(read_file(folder / "code.txt"), "0\n");
+  EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "ok");
+}
+
+TEST(Program, ADirectoryThatIsGoneIsNoInternalError) {
+  const Small folder("gone");
+  std::filesystem::create_directory(folder / "inner");
+  const std::string inner = (folder / "inner").string();
+  const int status = std::system(
+      ("cd '" + inner + "' && rmdir '" + inner + "' && '" TOILE_PROGRAM "' check ../scene.toml >/dev/null 2>&1")
+          .c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST(Program, WhenNothingMoreCanBeWrittenItIsExit8AndNoFileIsHalf) {
+  const Small folder("full");
+  const std::string command = "cd '" + folder.path().string() +
+                              "' && ulimit -f 4 && '" TOILE_PROGRAM
+                              "' drape scene.toml -o result --set 'output.formats=[\"vtu\"]' >/dev/null 2>stderr.txt";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 8);
+  EXPECT_NE(read_file(folder / "stderr.txt").find(".vtu: "), std::string::npos);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "result")) {
+    EXPECT_TRUE(entry.is_directory() || entry.path().filename() == "run.log") << entry.path();
+  }
+}
+
 TEST(Program, AUsedDirectoryIsKeptUnlessOverwritten) {
   const Small folder("overwrite");
   write_file(folder / "result/mine.txt", "mine");
@@ -159,7 +235,8 @@ TEST(Program, AUsedDirectoryIsKeptUnlessOverwritten) {
 TEST(Program, AnUnmetLimitIsExit6) {
   const Small folder("limit");
   const Outcome run = toile(
-      folder, "drape scene.toml -o result --set strain_limit.tolerance=1e-15 --set strain_limit.max_iterations=1");
+      folder, "drape scene.toml -o result --set strain_limit.variant=paper --set strain_limit.tolerance=1e-15 "
+              "--set strain_limit.max_iterations=1");
   EXPECT_EQ(run.code, 6) << run.err;
   EXPECT_NE(run.err.find("strain limit is not met"), std::string::npos) << run.err;
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "check");
@@ -175,6 +252,111 @@ TEST(Program, AnInterruptLeavesWholeFiles) {
   EXPECT_EQ(WEXITSTATUS(status), 130) << read_file(folder / "stderr.txt");
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "interrupted");
   EXPECT_EQ(toile(folder, "roundtrip result/draped.igs").code, 0);
+}
+
+// Long enough to be stopped on the way, with frames of every format.
+const std::string long_run =
+    "drape scene.toml --set 'output.formats=[\"vtu\", \"obj\", \"iges\"]' --set output.every=0.25 --until 2";
+
+// Starts a long run, sends it a signal a little after its first checkpoint is there, and returns how it ended.
+int end_by(const Folder& folder, const std::string& signal) {
+  const std::string command = "cd '" + folder.path().string() + "' && { '" TOILE_PROGRAM "' " + long_run +
+                              " -o result 2>stderr.txt & }; while [ ! -e result/checkpoint ]; do sleep 0.01; done; "
+                              "sleep 0.1; kill -" +
+                              signal + " $!; wait $!";
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(Program, AStoppedRunResumesToTheSameBytes) {
+  const Small folder("signals");
+  ASSERT_EQ(toile(folder, long_run + " -o whole").code, 0);
+  for (const auto& [signal, code] : {std::pair("INT", 130), std::pair("TERM", 130), std::pair("KILL", 128 + 9)}) {
+    std::filesystem::remove_all(folder / "result");
+    EXPECT_EQ(end_by(folder, signal), code) << signal << ": " << read_file(folder / "stderr.txt");
+    if (code == 130) {
+      EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "interrupted");
+      EXPECT_EQ(toile(folder, "roundtrip result/draped.igs").code, 0);
+    }
+    const Outcome resumed = toile(folder, long_run + " -o result --resume result/checkpoint");
+    ASSERT_EQ(resumed.code, 0) << signal << ": " << resumed.err;
+    expect_same_results(folder / "whole", folder / "result");
+  }
+}
+
+TEST(Program, ATimeLimitIsExit7AndEveryRunGetsAhead) {
+  const Small folder("time_limit");
+  Outcome run = toile(folder, "drape scene.toml -o result --time-limit 1e-9");
+  EXPECT_EQ(run.code, 7) << run.err;
+  EXPECT_NE(run.err.find("time limit"), std::string::npos) << run.err;
+  int runs = 1;
+  for (; run.code == 7 && runs < 1000; ++runs) {
+    const auto report = nlohmann::json::parse(read_file(folder / "result/report.json"));
+    ASSERT_EQ(report["exit"], "time_limit");
+    ASSERT_EQ(report["steps"], runs);
+    run = toile(folder,
+                "drape scene.toml -o result --resume result/checkpoint --set solver.time_limit=1e-9 --until 0.02");
+  }
+  EXPECT_EQ(run.code, 0) << run.err;
+  ASSERT_EQ(toile(folder, "drape scene.toml -o whole --until 0.02").code, 0);
+  EXPECT_EQ(read_file(folder / "result/draped.igs"), read_file(folder / "whole/draped.igs"));
+}
+
+TEST(Program, ACheckpointThatDoesNotFitIsExit3AndLeavesNoFile) {
+  const Small folder("misfit");
+  ASSERT_EQ(toile(folder, "drape scene.toml -o first --until 0.05").code, 0);
+  write_file(folder / "cut", read_file(folder / "first/checkpoint").substr(0, 500));
+  const auto refused = [&](const std::string& arguments, const std::string& part) {
+    const Outcome run = toile(folder, "drape scene.toml -o other " + arguments);
+    EXPECT_EQ(run.code, 3) << arguments << ": " << run.err;
+    EXPECT_NE(run.err.find(part), std::string::npos) << run.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "other"));
+  };
+  refused("--resume nowhere", "nowhere");
+  refused("--resume cut", "cut short");
+  refused("--resume scene.toml", "no checkpoint");
+  refused("--resume first/checkpoint --until 0.01", "solver.until");
+  refused("--resume first/checkpoint --set load.wind=[1,0,0]", "load.wind");
+  EXPECT_EQ(toile(folder, "drape scene.toml --dry-run --resume first/checkpoint").code, 2);
+  // Into another folder, on to a later time.
+  EXPECT_EQ(toile(folder, "drape scene.toml -o other --resume first/checkpoint").code, 0);
+  ASSERT_EQ(toile(folder, "drape scene.toml -o whole").code, 0);
+  EXPECT_EQ(read_file(folder / "other/draped.igs"), read_file(folder / "whole/draped.igs"));
+  EXPECT_EQ(toile(folder, "drape scene.toml -o whole --resume first/checkpoint").code, 8) << "another run's folder";
+}
+
+TEST(Program, AStudyRunsThisProgram) {
+  const Small folder("study");
+  write_file(folder / "study.toml",
+             "scene = \"scene.toml\"\nquantity.of = \"lowest\"\nreference.kind = \"finest\"\n"
+             "limits.megabytes = 1e9  # sanitizers reserve address space\n"
+             "vary.panel.0.refine.spans = [[5, 5], [10, 10]]\n");
+  const Outcome run = toile(folder, "study study.toml -o result");
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.out.find("reference of"), std::string::npos) << run.out;
+  const std::string csv = read_file(folder / "result/study.csv");
+  EXPECT_NE(csv.find("\nshell,verlet,cut,2,5x5,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find("\nshell,verlet,cut,2,10x10,"), std::string::npos) << csv;
+  const Outcome again = toile(folder, "study study.toml -o result --json");
+  EXPECT_EQ(nlohmann::json::parse(again.out)["series"][0]["cases"].size(), 2u);
+  EXPECT_NE(again.err.find("2 of 2 runs are from an earlier call"), std::string::npos) << again.err;
+  EXPECT_EQ(toile(folder, "study none.toml").code, 3);
+}
+
+TEST(Program, AnInterruptedStudyGoesOnLater) {
+  const Small folder("study_interrupt");
+  write_file(folder / "study.toml",
+             "scene = \"scene.toml\"\nquantity.of = \"lowest\"\nreference.kind = \"finest\"\n"
+             "limits.megabytes = 1e9\nvary.solver.until = [0.01, 100000]\n[set]\noutput.every = 1\n");
+  const std::string command = "cd '" + folder.path().string() +
+                              "' && timeout --preserve-status -s INT 2 '" TOILE_PROGRAM
+                              "' study study.toml -o result >stdout.txt 2>stderr.txt";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130) << read_file(folder / "stderr.txt");
+  const std::string csv = read_file(folder / "result/study.csv");
+  EXPECT_NE(csv.find(",ok,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find(",not run,"), std::string::npos) << csv;
 }
 
 TEST(Program, TemplatesRunAtOnce) {

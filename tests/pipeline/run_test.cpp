@@ -129,6 +129,22 @@ TEST(Run, TheSameSceneGivesTheSameBytes) {
   EXPECT_EQ(draped_file(b, q).text, draped_file(b, control_points(*second.system, second.state)).text);
 }
 
+TEST(Run, ABuildDoesNotDependOnTheHeap) {
+  const Folder folder("heap");
+  const std::string scene = test::scene_text("[[pin]]\nat = \"curve:0,2\"\n");
+  const Build first = built(folder, test::trimmed_sheet("cloth"), scene);
+  const std::vector<double>& weights = first.model->panels()[0].quadrature.weights;
+  std::mt19937 random(3);
+  for (int k = 0; k < 8; ++k) {
+    std::vector<std::vector<char>> holes;
+    for (int n = 0; n < 200; ++n) holes.emplace_back(random() % 400);
+    for (int n = 0; n < 200; n += 2) holes[static_cast<std::size_t>(n)] = {};
+    const Build again = built(folder, test::trimmed_sheet("cloth"), scene);
+    EXPECT_EQ(again.model->panels()[0].quadrature.weights, weights);
+    EXPECT_EQ(again.model->lumped_mass(), first.model->lumped_mass());
+  }
+}
+
 TEST(Run, DrapedFileIsTheLastState) {
   const Folder folder("draped");
   const Build b = built(folder, test::trimmed_sheet("cloth"), test::scene_text("[[pin]]\nat = \"curve:0,2\"\n"));
@@ -280,7 +296,7 @@ TEST(Run, StoppingLeavesAWholeResult) {
   const Build b = built(folder, test::sheet("cloth"), test::scene_text(corner_pins));
   int steps = 0;
   RunHooks hooks;
-  hooks.stop = [&] { return ++steps == 3; };
+  hooks.stop = [&] { return ++steps == 3 ? RunExit::interrupted : RunExit::ok; };
   const RunResult result = run(b, hooks);
   EXPECT_EQ(result.exit, RunExit::interrupted);
   EXPECT_EQ(result.steps, 3);

@@ -3,7 +3,9 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pipeline/build.h"
@@ -11,6 +13,7 @@
 #include "pipeline/panels.h"
 #include "pipeline/run.h"
 #include "pipeline/scene.h"
+#include "pipeline/study.h"
 #include "support/near.h"
 
 namespace toile {
@@ -38,7 +41,7 @@ TEST(Samples, PanelsAreWhatTheDrafterWrites) {
     EXPECT_EQ(read_file(entry.path()), read_file(std::filesystem::path(TOILE_SAMPLES) / name)) << name;
     ++files;
   }
-  EXPECT_EQ(files, 10);
+  EXPECT_EQ(files, 33);
 }
 
 // Example 4.4: the load per length is the nominal stress.
@@ -69,8 +72,8 @@ TEST(Samples, KidnappedClothGainsNoEnergy) {
   EXPECT_GT(ran.energy.load_work, 0.4);
 }
 
-// Softly held rows leave a rest of strain that a smaller step alone would turn into a larger velocity: before the rest was
-// settled first, this run ended as solver_failed.
+// Softly held rows leave a rest of strain that a smaller step alone would turn into a larger velocity: before the rest
+// was settled first, this run ended as solver_failed.
 TEST(Samples, ARefusedStepIsRedoneFromASettledState) {
   const std::vector<std::string> soft{"fabric.paper.drag=0", "strain_limit.regularisation=2e-4", "solver.dt=2e-3"};
   const Ran ran = run_sample("kidnapped_a/scene.toml", soft);
@@ -91,6 +94,54 @@ TEST(Samples, TurnedNetsDrapeLikeTheFittedOne) {
     EXPECT_LE((other.measures.points[0] - fitted.measures.points[0]).norm(), corner) << name;
     EXPECT_LE((other.measures.points[1] - fitted.measures.points[1]).norm(), 0.010) << name;
   }
+}
+
+// Runs a study with its results in `folder`; returns the exit code and what it prints.
+std::pair<int, std::string> run_sample_study(Study study, const std::filesystem::path& folder) {
+  study.limits.megabytes = 1e9;  // sanitizers reserve address space
+  StudyOptions options;
+  options.program = TOILE_PROGRAM;
+  options.directory = folder;
+  Console console;
+  console.quiet = true;
+  ::testing::internal::CaptureStdout();
+  const int code = run_study(study, options, console);
+  return {code, ::testing::internal::GetCapturedStdout()};
+}
+
+// The short part of samples/stability: every row stable, refused or stopped with its cause.
+TEST(Samples, ExtremesAreStableOrSayWhyNot) {
+  const test::Folder folder("stability");
+  const auto [code, table] = run_sample_study(read_study(TOILE_SAMPLES "/stability/short.toml"), folder / "out");
+  EXPECT_EQ(code, 0) << table;
+}
+
+// What runs for minutes is at least read: keys, panels and references.
+TEST(Samples, EveryStudyFileIsValid) {
+  int studies = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(TOILE_SAMPLES)) {
+    if (entry.path().extension() != ".toml") continue;
+    const std::string text = read_file(entry.path());
+    if (text.find("[[series]]") == std::string::npos) continue;
+    const Study study = read_study(entry.path());
+    for (const StudySeries& series : study.series) EXPECT_FALSE(series.cases.empty()) << entry.path();
+    ++studies;
+  }
+  EXPECT_EQ(studies, 11);
+}
+
+// Refinement brings the cantilever to the elastica: sixteen elements leave 3e-4 of its length, stretch included.
+TEST(Samples, CantileverTendsToTheElastica) {
+  const test::Folder folder("cantilever");
+  Study study = read_study(TOILE_SAMPLES "/studies/cantilever/study.toml");
+  study.series.resize(1);
+  study.series[0].cases.resize(3);
+  study.series[0].lengths = {3};
+  const auto [code, table] = run_sample_study(study, folder / "out");
+  ASSERT_EQ(code, 0) << table;
+  const auto cases = nlohmann::json::parse(read_file(folder / "out/study.json"))["series"][0]["cases"];
+  EXPECT_LE(cases[1]["error"], 0.25 * cases[0]["error"].get<double>());
+  EXPECT_LE(cases[2]["error"], 0.3e-3 * 0.2);
 }
 
 }  // namespace

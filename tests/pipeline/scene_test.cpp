@@ -146,8 +146,14 @@ TEST(Scene, SeamsAndObstaclesAreReadAndChecked) {
   EXPECT_EQ(scene.obstacles[0].metres_per_unit, 0.01);
 }
 
+TEST(Scene, ABandNamesWhatItNeeds) {
+  EXPECT_NE(refusal(11, "mode = \"band\"").find("stretch = [weft, warp]"), std::string::npos);
+  EXPECT_EQ(refusal(11, "mode = \"band\"\nstretch = [0.05, 0.02]"), "accepted");
+  EXPECT_NE(refusal(11, "mode = \"band\"\nstretch = [0.05, -0.02]").find("above 0"), std::string::npos);
+  EXPECT_NE(refusal(11, "stretch = [0.05, 0.02]").find("belongs to mode"), std::string::npos);
+}
+
 TEST(Scene, LaterFeaturesAreRefusedByName) {
-  expect_message(11, "mode = \"band\"", {"not supported by this version", "inextensible"});
   expect_message(11, "solver = \"lagrange\"", {"not supported by this version", "fast"});
   expect_message(11, "points = \"greville\"", {"not supported by this version", "knot-mesh"});
   expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});

@@ -118,6 +118,20 @@ TEST(LoopValidation, RefusesHolesThatCrossTheOutline) {
   expect_error(face, {"panel 'panel', loop", "crosses", "(u, v) = (3.5, "});
 }
 
+// The sides of the hole cross the outline where one of its segments ends.
+TEST(LoopValidation, RefusesCrossingsInJointsOfSegments) {
+  for (const bool weighted : {false, true}) {
+    std::vector<Curve2> outline;
+    const std::vector<Vector2d> corners = {{1, 1}, {3, 1}, {3, 2}, {3, 3}, {1, 3}};
+    for (std::size_t k = 0; k < corners.size(); ++k)
+      outline.push_back(bezier_curve({corners[k], corners[(k + 1) % corners.size()]},
+                                     weighted ? std::vector<double>{1, 8} : std::vector<double>{}));
+    expect_error(
+        trimmed(unit_cells(4), {loop_of(outline), backwards(polygon_loop({{2, 2}, {3.5, 2}, {3.5, 2.5}, {2, 2.5}}))}),
+        {"crosses", "(u, v) = (3, 2"});
+  }
+}
+
 TEST(LoopValidation, RefusesHolesInHoles) {
   TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({2, 2}, 1)})),
                                                 backwards(loop_of({round_curve({2, 2}, 0.5)}))});
@@ -178,7 +192,29 @@ TEST(LoopValidation, SnapsToKnotLinesWithinTheResolution) {
 TEST(LoopValidation, NeedsOneOuterLoop) {
   TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop(square)});
   face.loops[0].kind = LoopKind::hole;
-  expect_error(face, {"0 outer loops"});
+  expect_error(face, {"panel 'panel': has no outer loop"});
+  TrimmedSurface two =
+      trimmed(unit_cells(4), {polygon_loop({{0, 0}, {1, 0}, {1, 1}}), polygon_loop({{2, 2}, {3, 2}, {3, 3}})});
+  two.loops[1].kind = LoopKind::outer;
+  expect_error(two, {"panel 'panel', loop 1: a second outer loop, beside loop 0", "(u, v) = (2, 2)"});
+}
+
+// The arc comes to (1, 0) along the side that leaves it upwards: a joint without an angle.
+TEST(LoopValidation, AnArcMayArriveAlongTheNextSide) {
+  TrimmedSurface face =
+      trimmed(unit_cells(1), {loop_of({bezier_curve({{0, 0}, {1, 0x1p-30}, {1, 0}}), line_segment<2>({1, 0}, {1, 1}),
+                                       line_segment<2>({1, 1}, {0, 1}), line_segment<2>({0, 1}, {0, 0})})});
+  EXPECT_TRUE(validate_loops(face).empty());
+}
+
+// An inscribed square: every corner of the hole lies on the outline.
+TEST(LoopValidation, AHoleMayTouchTheOutlineWithAllItsCorners) {
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop({{0, 0}, {4, 0}, {4, 4}, {0, 4}}),
+                                                backwards(polygon_loop({{2, 0}, {4, 2}, {2, 4}, {0, 2}}))});
+  EXPECT_EQ(validate_loops(face).size(), 4u);
+  const TrimTopology topology = trace_trims(face);
+  expect_laws(face, topology);
+  EXPECT_EQ(tally(topology).cut, 8);
 }
 
 TEST(LoopValidation, UnclampedCurvesGetTheirEnds) {

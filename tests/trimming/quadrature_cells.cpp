@@ -85,7 +85,7 @@ TEST(CutQuadrature, QuarterDiscIsExactToRounding) {
 
 // Material between v = 0.5 and a line eps above it, and the same upright.
 TEST(CutQuadrature, ThinSliversAreExactRelativeToThemselves) {
-  for (double eps = 1e-3; eps > 5e-11; eps /= 10)
+  for (double eps = 1e-3; eps > 5e-13; eps /= 10)
     for (const bool upright : {false, true}) {
       std::vector<Vector2d> corners = {{0, 0.5}, {1, 0.5}, {1, 0.5 + eps}, {0, 0.5 + 0.5 * eps}};
       if (upright) {
@@ -119,7 +119,7 @@ TEST(CutQuadrature, CornerSliversAreExactRelativeToThemselves) {
 
 // What is left of a cell when the sliver is taken away.
 TEST(CutQuadrature, CellsWithoutASliverAreExact) {
-  for (double eps = 1e-3; eps > 5e-11; eps /= 10) {
+  for (double eps = 1e-3; eps > 5e-13; eps /= 10) {
     const std::vector<std::vector<Vector2d>> polygons = {
         {{0, 0}, {1, 0}, {1, 1 - eps}, {0, 1}},
         {{eps, 0}, {1, 0}, {1, 1}, {0, 1}, {0, eps}},
@@ -136,7 +136,7 @@ TEST(CutQuadrature, CellsWithoutASliverAreExact) {
 // A strip of width eps across the cell, slanted: its box is the whole cell, and its area a difference of numbers near 1
 // in extended precision.
 TEST(CutQuadrature, SlantedSliversAreExact) {
-  for (double eps = 1e-2; eps > 5e-11; eps /= 10) {
+  for (double eps = 1e-2; eps > 5e-13; eps /= 10) {
     const std::vector<Vector2d> corners = {{0, 0}, {eps, 0}, {1, 0.75}, {1, 0.75 + eps}};
     const CutQuadrature rule = rule_of(cut_cell(2, {polygon(corners)}));
     expect_lawful(
@@ -148,7 +148,7 @@ TEST(CutQuadrature, SlantedSliversAreExact) {
 
 // The lens that a parabola cuts off just above v = 0: 0 <= v <= 4 h u (1 - u).
 TEST(CutQuadrature, GrazingParabolaIsExact) {
-  for (double h = 0.25; h > 5e-11; h /= 10) {
+  for (double h = 0.25; h > 5e-13; h /= 10) {
     const Curve2 arch = bezier({{0, 0}, {0.5, 2 * h}, {1, 0}});
     const CutQuadrature rule = rule_of(cut_cell(2, {{border({0, 0}, {1, 0}), trim(arch, 1, 0)}}));
     expect_lawful(rule, 2, [&](double u, double v) { return v > 0 && v < 4 * h * u * (1 - u); });

@@ -1,9 +1,13 @@
 // Quadrature over traced trims: whole panels against closed forms.
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <random>
 
+#include "geometry/refine.h"
 #include "hand_made.h"
+#include "trim_cases.h"
 #include "trims.h"
 
 namespace toile::test {
@@ -64,7 +68,7 @@ TEST(TrimQuadrature, DiscsOnGrids) {
 
 // The disc passes the lines around it by eps: four caps of that height, of the exact area of a cap.
 TEST(TrimQuadrature, DiscsThatJustPassKnotLines) {
-  for (double eps = 1e-2; eps > 5e-11; eps /= 10) {
+  for (double eps = 1e-2; eps > 5e-13; eps /= 10) {
     const Vector2d centre(2.5, 2.5);
     const double r = 1.5 + eps;
     const Panel panel = panel_of(trimmed(unit_cells(5), {loop_of({round_curve(centre, r)})}), quadratic);
@@ -102,6 +106,29 @@ TEST(TrimQuadrature, PolygonsWithHolesOnGrids) {
                       Rational(exact_moment(outer, a, b) + exact_moment(hole, a, b)).convert_to<double>(), 1e-12);
 }
 
+// Holes that share cells, touch each other in a point off every line, and touch the outline.
+TEST(TrimQuadrature, HolesThatTouchGiveTheirArea) {
+  std::vector<TrimLoop> loops = {polygon_loop({{0, 0}, {4, 0}, {4, 4}, {0, 4}})};
+  double area = 16;
+  const auto add = [&](Vector2d centre, double r) {
+    loops.push_back(backwards(loop_of({round_curve(centre, r)})));
+    area -= pi * r * r;
+  };
+  add({1.25, 1.5}, 0.0625);
+  add({1.375, 1.5}, 0.0625);   // beside the first
+  add({1.3125, 1.75}, 0.125);  // in the same cell
+  add({0.375, 2.5}, 0.375);    // on the outline
+  add({3, 3}, 0.5);            // around a vertex
+  TrimmedSurface face = trimmed(unit_cells(4), loops);
+  int touches = 0;
+  for (const LoopRepair& r : validate_loops(face)) touches += r.what.find("touches") != std::string::npos;
+  EXPECT_EQ(touches, 2);
+  const Panel panel = panel_of(face, quadratic);
+  expect_lawful(panel.rule, 2, [&](double u, double v) { return contains(panel.surface, panel.topology, {u, v}); });
+  expect_near_rel(panel.rule.area, area, 1e-13);
+  EXPECT_EQ(std::count(panel.topology.cells.begin(), panel.topology.cells.end(), CellKind::cut), 6);
+}
+
 TEST(TrimQuadrature, TrimsOnKnotLinesCutNothing) {
   const std::vector<Vector2d> square = {{1, 1}, {4, 1}, {4, 3}, {1, 3}};
   const Panel panel = panel_of(trimmed(unit_cells(5), {polygon_loop(square)}), quadratic);
@@ -111,6 +138,20 @@ TEST(TrimQuadrature, TrimsOnKnotLinesCutNothing) {
 }
 
 // Reversed curves and holes turn nothing but the direction.
+TEST(PanelMeasure, AFaceWithAPoleIsMeasuredAtOnce) {
+  // A triangle with sides 1, 1 and sqrt(2), its edge v = 1 drawn together in one point that is no exact double.
+  Eigen::Matrix3Xd points(3, 4);
+  points << 0.3, 1.3, 0.3, 0.3, 0.7, 0.7, 1.7, 1.7, 0.1, 0.1, 0.1, 0.1;
+  TrimmedSurface face;
+  const KnotVector line = uniform_knots(1, 1);
+  face.surface = NurbsSurface(line, line, points, {1, 0.7, 1.3, 0.9});
+  face.surface = elevate_degree(elevate_degree(face.surface, Direction::u, 3), Direction::v, 3);
+  face.loops = {natural_loop(face.surface)};
+  const PanelMeasure measured = measure(face, trace_trims(face));
+  EXPECT_NEAR(measured.area, 0.5, 1e-9);
+  EXPECT_NEAR(measured.loop_lengths.at(0), 2 + std::sqrt(2.0), 1e-9);
+}
+
 TEST(TrimQuadrature, ReversedCurvesGiveTheSameRule) {
   const auto area = [](bool reversed) {
     TrimLoop loop = loop_of({round_curve({2.3, 2.6}, 1.7)});
@@ -147,6 +188,108 @@ TEST(TrimQuadrature, SmoothFunctionsConvergeOnDiscs) {
       if (n == 8) before = error;
     }
   }
+}
+
+// Integral of u^a v^b over the inside of loops of polynomial pieces, in exact arithmetic: Green's theorem in the power
+// basis.
+class ExactMoments {
+ public:
+  explicit ExactMoments(const std::vector<ExactLoop>& loops) {
+    for (const ExactLoop& loop : loops)
+      for (const ExactPiece& piece : loop) pieces_.push_back({power_basis(piece.u), power_basis(piece.v)});
+  }
+  double operator()(int a, int b) const {
+    Rational total = 0;
+    for (const auto& [u, v] : pieces_) {
+      Polynomial f{1};
+      for (int k = 0; k <= a; ++k) f = product(f, u);
+      for (int k = 0; k < b; ++k) f = product(f, v);
+      Polynomial dv;
+      for (std::size_t k = 1; k < v.size(); ++k) dv.push_back(v[k] * static_cast<int>(k));
+      f = product(f, dv);
+      for (std::size_t k = 0; k < f.size(); ++k) total += f[k] / static_cast<int>(k + 1);
+    }
+    return Rational(total / (a + 1)).convert_to<double>();
+  }
+
+ private:
+  using Polynomial = std::vector<Rational>;
+  static Polynomial product(const Polynomial& p, const Polynomial& q) {
+    Polynomial r(p.size() + q.size() - 1, 0);
+    for (std::size_t i = 0; i < p.size(); ++i)
+      for (std::size_t j = 0; j < q.size(); ++j) r[i + j] += p[i] * q[j];
+    return r;
+  }
+  static Polynomial power_basis(const std::vector<double>& bernstein) {
+    Polynomial c(bernstein.begin(), bernstein.end()), p;
+    const int n = static_cast<int>(c.size()) - 1;
+    Rational binomial = 1;
+    for (int k = 0; k <= n; ++k) {
+      p.push_back(binomial * c[0]);
+      for (std::size_t i = 0; i + 1 < c.size(); ++i) c[i] = c[i + 1] - c[i];
+      c.pop_back();
+      binomial = binomial * (n - k) / (k + 1);
+    }
+    return p;
+  }
+  std::vector<std::array<Polynomial, 2>> pieces_;
+};
+
+// In the material or, where that is thinner than rounding, 4 eps of the panel beside it.
+bool within_rounding(const Panel& panel, const Vector2d& x) {
+  const double d = 0x1p-50 * std::max(panel.topology.mesh.u.back(), panel.topology.mesh.v.back());
+  for (const double a : {0.0, d, -d})
+    for (const double b : {0.0, d, -d})
+      if (contains(panel.surface, panel.topology, x + Vector2d(a, b))) return true;
+  return false;
+}
+
+// Curved trims of degree 1 to 5 through vertices, along lines, touching, with slivers down to an ulp of the
+// coordinates: the whole panel's moments are those of exact arithmetic, every point is in the material.
+TEST(TrimQuadrature, HardRandomTrimsHaveExactMoments) {
+  int made = 0;
+  for (std::uint64_t seed = 1; made < 60; ++seed) {
+    const TrimCase given = random_trim_case(seed);
+    const bool polynomial = std::all_of(given.loops.begin(), given.loops.end(), [](const ExactLoop& loop) {
+      return std::all_of(loop.begin(), loop.end(),
+                         [](const ExactPiece& p) { return p.w == std::vector<double>(p.w.size(), 1.0); });
+    });
+    if (!given.valid || !polynomial) continue;
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", " + given.family);
+    ++made;
+    TrimmedSurface face = surface_of(given);
+    validate_loops(face);
+    const int p = 1 + static_cast<int>(seed % 3);
+    const Panel panel = panel_of(face, {.degree_u = 2 * p, .degree_v = 2 * p, .gauss_u = p + 1, .gauss_v = p + 1});
+    for (std::size_t k = 0; k < panel.rule.points.size(); ++k) {
+      EXPECT_GT(panel.rule.weights[k], 0);
+      EXPECT_TRUE(within_rounding(panel, panel.rule.points[k])) << panel.rule.points[k].transpose();
+    }
+    const ExactMoments exact(given.loops);
+    for (int b = 0; b <= 2 * p; ++b)
+      for (int a = 0; a <= 2 * p; ++a) expect_near_rel(moment(panel.rule, a, b), exact(a, b), 1e-12);
+  }
+}
+
+// Rational trims: the moments are integrated to rounding, and a smooth function's error falls by a factor with every
+// degree. A disc in one cell, exp(u + v / 2) over it.
+TEST(TrimQuadrature, RationalTrimsConvergeSpectrally) {
+  const double c = std::hypot(1, 0.5), r = 0.9, exact = 2 * pi * r * std::cyl_bessel_i(1, c * r) / c;
+  const TrimmedSurface face = trimmed(knot_plane({-1, 1}, {-1, 1}), {loop_of({round_curve({0, 0}, r)})});
+  const TrimTopology topology = trace_trims(face);
+  std::printf("degree  points  relative error of the integral of exp(u + v/2) over a disc in one cell\n");
+  double before = 1;
+  for (int d = 1; d <= 12; ++d) {
+    const CutQuadrature rule = quadrature(face, topology, {.degree_u = d, .degree_v = d, .gauss_u = 1, .gauss_v = 1});
+    const double error = std::abs(sum(rule, [](double u, double v) { return std::exp(u + v / 2); }) / exact - 1);
+    std::printf("%6d  %6zu  %.1e\n", d, rule.points.size(), error);
+    EXPECT_LE(rule.moment_residual, 1e-13);
+    if (d % 2 == 0) {
+      EXPECT_LT(error, std::max(before / 10, 1e-14));
+      before = error;
+    }
+  }
+  EXPECT_LT(before, 1e-13);
 }
 
 // Star-shaped closed splines of degree 1 to 4 with corners at random radii and weights: the rule is exact to

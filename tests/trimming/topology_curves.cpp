@@ -55,6 +55,26 @@ TEST(TrimTopology, RandomCurvesKeepTheLaws) {
   }
 }
 
+// Joints are compared bitwise: a span at a clamped end starts in the control point, however small its coordinate beside
+// the others.
+TEST(TrimTopology, SpansEndInTheEndsOfClampedCurves) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int k = 0; k < 200; ++k) {
+    Curve2::Points points(2, 5);
+    std::vector<double> weights;
+    for (int i = 0; i < 5; ++i) {
+      points.col(i) << unit(random), unit(random) * (i % 4 == 0 ? 0x1p-60 : 1);
+      weights.push_back(k % 2 == 0 ? 0.25 + unit(random) : 1);
+    }
+    const Curve2 curve(KnotVector(3, {0, 0, 0, 0, 0.5, 1, 1, 1, 1}), points, weights);
+    const std::vector<TrimSpan> spans = trim_spans(curve);
+    ASSERT_EQ(spans.size(), 2u);
+    EXPECT_EQ(spans.front().first(), points.col(0));
+    EXPECT_EQ(spans.back().last(), points.col(4));
+  }
+}
+
 // A B-spline whose control points share v = 2 runs on that line exactly, whatever its knots.
 TEST(TrimTopology, SplineOnALineStaysOnIt) {
   const KnotVector knots(3, {0, 0, 0, 0, 0.1, 0.37, 0.7, 1, 1, 1, 1});

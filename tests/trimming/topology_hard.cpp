@@ -70,6 +70,25 @@ TEST(TrimTopology, MultiplicityDecidesCrossingOrTouch) {
   EXPECT_EQ(on_line(t, 1, PointKind::crossing_v), 0);
 }
 
+// v - 6 = (1 - 1.5 s)^5 / 8 + (1 - s)^5 / 2^38: one crossing near a fivefold root, at ((1.5 s - 1) / (1 - s))^5 =
+// 2^-35.
+TEST(TrimTopology, FlatCrossingsAreFoundWhereTheyAre) {
+  std::vector<Vector2d> control;
+  for (int k = 0; k <= 5; ++k) control.emplace_back(3 - k * 0.25, 6 + 0.125 * std::pow(-0.5, k));
+  control[0].y() += 0x1p-38;
+  const TrimmedSurface face = trimmed(
+      unit_cells(8), {loop_of({bezier_curve(control), line_segment<2>(control[5], {1.75, 3.5}),
+                               line_segment<2>({1.75, 3.5}, {3, 3.5}), line_segment<2>({3, 3.5}, control[0])})});
+  const TrimTopology t = trace_trims(face);
+  const double s = (1 + 0x1p-7) / (1.5 + 0x1p-7);
+  const auto event =
+      std::find_if(t.events.begin(), t.events.end(), [](const TrimEvent& e) { return e.curve == 0 && e.line_v == 6; });
+  ASSERT_NE(event, t.events.end());
+  EXPECT_EQ(event->kind, PointKind::crossing_v);
+  expect_near_rel(event->t, s, 1e-15);
+  expect_near_rel(event->uv.x(), 3 - 1.25 * s, 1e-15);
+}
+
 TEST(TrimTopology, DiagonalThroughVertices) {
   expect_tally(trimmed(unit_cells(4), {polygon_loop({{0, 0}, {4, 4}, {0, 4}})}),
                {.crossing_uv = 12, .inside = 6, .cut = 4, .outside = 6, .vertices = 3});

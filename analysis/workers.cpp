@@ -1,0 +1,62 @@
+#include "analysis/workers.h"
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include <system_error>
+
+namespace toile {
+namespace {
+
+// Sleeping and waking costs more than this; a step's next piece of work is often nearer.
+constexpr int spins = 2000;
+
+template <class T>
+void wait_while(const std::atomic<T>& value, T old) {
+  for (int k = 0; k < spins; ++k) {
+    if (value.load(std::memory_order_acquire) != old) return;
+#if defined(__x86_64__)
+    _mm_pause();
+#endif
+  }
+  value.wait(old, std::memory_order_acquire);
+}
+
+}  // namespace
+
+Workers::Workers(int count) {
+  try {
+    for (int part = 1; part < count; ++part) threads_.emplace_back([this, part] { work(part); });
+  } catch (const std::system_error&) {
+  }
+}
+
+Workers::~Workers() {
+  end_ = true;
+  start();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void Workers::start() {
+  busy_.store(static_cast<int>(threads_.size()), std::memory_order_relaxed);
+  round_.fetch_add(1, std::memory_order_release);
+  round_.notify_all();
+}
+
+void Workers::finish() {
+  for (int busy = busy_.load(std::memory_order_acquire); busy != 0; busy = busy_.load(std::memory_order_acquire)) {
+    wait_while(busy_, busy);
+  }
+}
+
+void Workers::work(int part) {
+  for (unsigned done = 0;; ++done) {
+    wait_while(round_, done);
+    if (end_) return;
+    call_(body_, part);
+    if (busy_.fetch_sub(1, std::memory_order_acq_rel) == 1) busy_.notify_one();
+  }
+}
+
+}  // namespace toile

@@ -1,0 +1,43 @@
+// A few threads that do the parts of one piece of work at the same time.
+#pragma once
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+namespace toile {
+
+// `count` threads, the caller's among them, or fewer where the system gives no more; they sleep in between. One caller
+// at a time.
+class Workers {
+ public:
+  explicit Workers(int count);
+  ~Workers();
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+  int count() const { return static_cast<int>(threads_.size()) + 1; }
+
+  // body(0) here, body(1) to body(count - 1) there; returns when all are done. They must not throw.
+  template <class Body>
+  void run(const Body& body) {
+    call_ = [](const void* b, int part) { (*static_cast<const Body*>(b))(part); };
+    body_ = &body;
+    start();
+    body(0);
+    finish();
+  }
+
+ private:
+  void start();
+  void finish();
+  void work(int part);
+
+  std::vector<std::thread> threads_;
+  void (*call_)(const void*, int) = nullptr;
+  const void* body_ = nullptr;
+  bool end_ = false;
+  std::atomic<unsigned> round_{0};
+  std::atomic<int> busy_{0};
+};
+
+}  // namespace toile

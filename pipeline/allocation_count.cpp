@@ -1,0 +1,51 @@
+#include "pipeline/allocation_count.h"
+
+#include <cstddef>
+#include <cstdlib>
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+namespace {
+thread_local long count = 0;
+}
+
+// glibc calls a program's own definitions of these everywhere, and keeps its own under other names.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t number, std::size_t size);
+void* __libc_realloc(void* old, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) {
+  ++count;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t number, std::size_t size) {
+  ++count;
+  return __libc_calloc(number, size);
+}
+void* realloc(void* old, std::size_t size) {
+  ++count;
+  return __libc_realloc(old, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  ++count;
+  return __libc_memalign(alignment, size);
+}
+}
+
+namespace toile {
+std::optional<long> allocation_count() {
+  return count;
+}
+}  // namespace toile
+
+#else
+
+namespace toile {
+std::optional<long> allocation_count() {
+  return std::nullopt;
+}
+}  // namespace toile
+
+#endif
