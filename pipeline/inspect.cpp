@@ -343,6 +343,7 @@ nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger) {
 }
 
 std::string ledger_text(const std::vector<LedgerEntry>& ledger) {
+  if (ledger.empty()) return {};
   struct Row {
     const LedgerEntry* first = nullptr;
     int count = 0;
@@ -381,7 +382,7 @@ nlohmann::ordered_json inspect_json(const Inspection& inspection) {
 std::string inspect_text(const Inspection& inspection, bool points) {
   std::string out = fmt::format("{}  {}{}\n", inspection.file, inspection.unit,
                                 inspection.exporter.empty() ? "" : ", written by " + inspection.exporter);
-  if (!inspection.ledger.empty()) out += ledger_text(inspection.ledger);
+  out += ledger_text(inspection.ledger);
   constexpr std::size_t shown = 12;
   for (std::size_t k = 0; k < inspection.warnings.size() && (points || k < shown); ++k) {
     out += "  warning      " + inspection.warnings[k] + '\n';

@@ -50,7 +50,8 @@ struct Inspection {
 // Throws GeometryError where no panel has a valid trim, with panel, loop and place of the first.
 Inspection inspect(const PanelFile& file, const InspectOptions& options = {});
 
-// The ledger by kind of entity and what became of it, with the first reason and its line; for programs, every entity.
+// The ledger by kind of entity and what became of it, with the first reason and its line (empty for a file
+// without entities); for programs, every entity.
 std::string ledger_text(const std::vector<LedgerEntry>& ledger);
 nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger);
 
