@@ -381,7 +381,7 @@ int run_command(int argc, char** argv) {
   CLI::App* presets_command = app.add_subcommand("presets", "Fabrics that need no table in the scene");
 
   for (CLI::App* command : {drape_command, inspect_command, convert_command, roundtrip_command, check_command,
-                             study_command, init_command, presets_command}) {
+                            study_command, init_command, presets_command}) {
     add_common(*command, common);
   }
 

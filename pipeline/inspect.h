@@ -44,7 +44,7 @@ struct Inspection {
   std::vector<LedgerEntry> ledger;    // of every entity
   std::vector<std::string> warnings;  // of the file, then of the panels
   std::vector<InspectedPanel> panels;
-  std::vector<std::string> refused;   // panels without a valid trim: panel, loop and place
+  std::vector<std::string> refused;  // panels without a valid trim: panel, loop and place
 };
 
 // Throws GeometryError where no panel has a valid trim, with panel, loop and place of the first.
