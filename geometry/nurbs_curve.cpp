@@ -116,6 +116,43 @@ Curve2 circular_arc(const Eigen::Vector2d& centre, double radius, double a, doub
   return {KnotVector(2, std::move(knots)), std::move(points), std::move(weights)};
 }
 
+Curve2 circular_arc_between(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double turn) {
+  constexpr double pi = std::numbers::pi;
+  if (!(std::abs(turn) > 0 && std::abs(turn) < 2 * pi && a != b))
+    throw GeometryError("an arc that turns by " + text(turn) +
+                        " rad must turn by more than 0, less than 2 pi, and its "
+                        "ends must differ");
+  const double half = std::abs(turn) / 2;  // angles are measured from the middle of the arc
+  const int pieces = std::clamp(static_cast<int>(std::ceil(2 * half / (pi / 2) - 1e-12)), 1, 4);
+  const double step = half / pieces;
+  // In the chord's frame, in units of the chord: x along it, y to the side of the arc. Written so that flat arcs, whose
+  // centre is far away, lose nothing: cos p - cos q = 2 sin((q + p) / 2) sin((q - p) / 2).
+  const Eigen::Vector2d middle = a + (b - a) / 2, chord = b - a;
+  const Eigen::Vector2d side = (turn > 0 ? 1.0 : -1.0) * Eigen::Vector2d(chord.y(), -chord.x());
+  const double diameter = 2 * std::sin(half);  // in radii: the chord
+  Curve2::Points points(2, 2 * pieces + 1);
+  std::vector<double> weights(2 * pieces + 1, 1.0);
+  std::vector<double> knots = {0, 0, 0};
+  for (int i = 0; i <= 2 * pieces; ++i) {
+    const double angle = step * (i - pieces);
+    double x = std::sin(angle) / diameter;
+    double y = 2 * std::sin((half + angle) / 2) * std::sin((half - angle) / 2) / diameter;
+    if (i % 2 == 1) {
+      // The tangents' meeting point lies (1 / cos(step) - 1) radii further out.
+      const double out = 2 * std::sin(step / 2) * std::sin(step / 2) / std::cos(step) / diameter;
+      x += out * std::sin(angle);
+      y += out * std::cos(angle);
+      weights[i] = std::cos(step);
+    }
+    points.col(i) = middle + x * chord + y * side;
+  }
+  points.col(0) = a;
+  points.col(2 * pieces) = b;
+  for (int i = 1; i < pieces; ++i) knots.insert(knots.end(), 2, static_cast<double>(i) / pieces);
+  knots.insert(knots.end(), 3, 1.0);
+  return {KnotVector(2, std::move(knots)), std::move(points), std::move(weights)};
+}
+
 namespace {
 
 // Adaptive bisection of the eight-point rule. A depth of 40 meets only at a cusp, where the rest contributes nothing.

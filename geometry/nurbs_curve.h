@@ -63,6 +63,10 @@ NurbsCurve<Dim> line_segment(const Eigen::Matrix<double, Dim, 1>& a, const Eigen
 // Circular arc in the plane from angle a to angle b > a [rad], b - a <= 2 pi, quadratic rational, counter-clockwise.
 Curve2 circular_arc(const Eigen::Vector2d& centre, double radius, double a, double b);
 
+// Circular arc from a to b that turns by `turn` [rad], 0 < |turn| < 2 pi, positive counter-clockwise; quadratic
+// rational, its ends bitwise a and b. Throws GeometryError for a turn out of range or a = b.
+Curve2 circular_arc_between(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double turn);
+
 // Arc length over [t0, t1], adaptively to the relative tolerance.
 template <int Dim>
 double arc_length(const NurbsCurve<Dim>& curve, Interval range, double relative_tolerance = 1e-10);

@@ -1,5 +1,10 @@
 #include "geometry/trimmed_surface.h"
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 namespace toile {
 
 TrimLoop natural_loop(const NurbsSurface& surface) {
@@ -13,6 +18,22 @@ TrimLoop natural_loop(const NurbsSurface& surface) {
     loop.curves.push_back(std::move(curve));
   }
   return loop;
+}
+
+std::optional<double> grain_angle(const TrimmedSurface& face) {
+  const auto mark = std::ranges::find(face.marks, MarkKind::grain, &PanelMark::kind);
+  if (mark == face.marks.end() || !mark->curve) return std::nullopt;
+  const Eigen::Vector2d a = mark->curve->start(), b = mark->curve->end();
+  const SurfaceJet jet = evaluate(face.surface, a.x(), a.y());
+  const Eigen::Vector3d warp = jet.u * (b - a).x() + jet.v * (b - a).y();
+  const Eigen::Vector3d across = jet.u.cross(jet.v).cross(jet.u).normalized();
+  if (!(warp.norm() > 0)) return std::nullopt;
+  // A quarter turn back from the warp; the grain has no sense, so half turns are the same.
+  const Eigen::Vector2d w(warp.dot(jet.u.normalized()), warp.dot(across));
+  double angle = std::atan2(-w.x(), w.y());
+  if (angle <= -std::numbers::pi / 2) angle += std::numbers::pi;
+  if (angle > std::numbers::pi / 2) angle -= std::numbers::pi;
+  return angle == 0 ? 0.0 : angle;
 }
 
 }  // namespace toile

@@ -31,6 +31,15 @@ struct TrimLoop {
   double gap = 0;  // largest distance in the parameter plane between the end of one curve and the start of the next
 };
 
+// What a pattern draws on a panel beside its outline, in the parameter plane: carried along, never cut.
+enum class MarkKind { grain, notch, drill, line, text };
+struct PanelMark {
+  MarkKind kind = MarkKind::line;
+  Eigen::Vector2d at{0, 0};     // a point; where a curve starts
+  std::optional<Curve2> curve;  // grain (straight, along the warp), line, some notches
+  std::string text;
+};
+
 // A face. Numbers are the file's own; one exact factor gives metres.
 struct TrimmedSurface {
   std::string name;
@@ -40,9 +49,14 @@ struct TrimmedSurface {
   double metres_per_unit = 1;
   double resolution = 0;  // smallest length that the file means (IGES global field 19), unit of the net
   std::string source;     // where it came from, for messages: "skirt.igs:412: entity 144"
+  std::vector<PanelMark> marks = {};
 };
 
 // Border of the domain as one loop of four lines: curves 0 to 3 from v = min, counter-clockwise.
 TrimLoop natural_loop(const NurbsSurface& surface);
+
+// Angle of the weft against the u direction [rad, (-pi/2, pi/2], positive towards v], where the panel has a grain line:
+// the grain runs along the warp, the weft at right angles to it.
+std::optional<double> grain_angle(const TrimmedSurface& face);
 
 }  // namespace toile

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -48,6 +49,11 @@ PanelFile parse_iges(std::string_view text, const std::string& name);
 // How records that the model knows are written: the bytes of the source, or made anew from the model.
 enum class IgesMode { replay, rewrite };
 std::string format_iges(const PanelFile& file, IgesMode mode = IgesMode::replay);
+
+// The records that were read, each B-spline surface (128) replaced by what `change` makes of it; the geometry must stay,
+// for boundaries and model curves are replayed with all the rest. `file` must have its records.
+using SurfaceChange = std::function<NurbsSurface(const NurbsSurface&)>;
+std::string format_iges(const PanelFile& file, const SurfaceChange& change);
 
 // A face for a new file: net and trims in `face`'s unit; faces of one file share it.
 struct OutputFace {

@@ -11,6 +11,7 @@
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "geometry/refine.h"
+#include "io/panel_file.h"
 #include "pipeline/places.h"
 #include "trimming/quadrature.h"
 
@@ -267,8 +268,13 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
     }
     parts.start = placed(start, unit, panel.place).points();
   }
-  parts.shell = {panel.name,   std::move(extension.rest), std::move(rule),  panel.fabric,
-                 panel.grain, mean_u_direction(rest),    std::move(kinks)};
+  parts.shell = {panel.name,
+                 std::move(extension.rest),
+                 std::move(rule),
+                 panel.fabric,
+                 panel.grain.value_or(grain_angle(built.source).value_or(0)),
+                 mean_u_direction(rest),
+                 std::move(kinks)};
   return parts;
 }
 
@@ -299,7 +305,7 @@ Build build(Scene scene) {
     const std::string path = panel.file.string();
     auto it = std::ranges::find(result.files, path, &PanelFile::path);
     if (it == result.files.end()) {
-      result.files.push_back(read_iges(panel.file));
+      result.files.push_back(read_panels(panel.file));
       result.files.back().path = path;
       for (const std::string& warning : result.files.back().warnings) result.warnings.push_back(warning);
       it = result.files.end() - 1;
@@ -376,6 +382,19 @@ Build build(Scene scene) {
           loads.force.segment<3>(3 * i) +=
               point.weight * basis.value[0][static_cast<std::size_t>(a + basis.count_u * b)] * traction.force;
         }
+      }
+    }
+  }
+  for (const SceneSeam& seam : result.scene.seams) {
+    for (const SeamSide& side : {seam.a, seam.b}) {
+      const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(side.panel))];
+      const bool there = std::ranges::any_of(panel.face.loops, [&](const TrimLoop& loop) {
+        return loop.index == side.loop &&
+               std::ranges::find(loop.curves, side.curve, &TrimCurve::index) != loop.curves.end();
+      });
+      if (!there) {
+        throw GeometryError(
+            fmt::format("{}: [[seam]]: panel '{}' has no curve {},{}", seam.where, side.panel, side.loop, side.curve));
       }
     }
   }

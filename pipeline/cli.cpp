@@ -20,11 +20,14 @@
 #include "geometry/error.h"
 #include "io/file.h"
 #include "io/iges.h"
+#include "io/panel_file.h"
 #include "pipeline/allocation_count.h"
 #include "pipeline/console.h"
+#include "pipeline/convert.h"
 #include "pipeline/drape.h"
 #include "pipeline/inspect.h"
 #include "pipeline/json_text.h"
+#include "pipeline/pattern_scene.h"
 #include "pipeline/scene.h"
 #include "pipeline/study.h"
 #include "pipeline/templates.h"
@@ -66,9 +69,15 @@ struct DrapeArguments {
 };
 
 struct InspectArguments {
-  std::string input, svg, span;
+  std::string input, svg, png, html, span;
   int degree = 0, spans = 0;
 };
+
+void add_refinement(CLI::App& command, InspectArguments& a) {
+  command.add_option("--degree", a.degree, "Degree")->check(CLI::Range(1, 5));
+  auto* span = command.add_option("--span", a.span, "Longest knot span (\"20 mm\")");
+  command.add_option("--spans", a.spans, "Spans per direction")->check(CLI::Range(1, 10000))->excludes(span);
+}
 
 double length_option(const std::string& text, const char* option) {
   try {
@@ -131,27 +140,57 @@ int run_drape(const DrapeArguments& a, const Common& common, Console& console) {
   return drape(std::move(scene), options, console);
 }
 
-int run_inspect(const InspectArguments& a, const Common& common, Console& console) {
+InspectOptions options_of(const InspectArguments& a) {
   InspectOptions options;
   if (a.degree > 0) options.degree = a.degree;
   if (a.spans > 0) options.spans = a.spans;
   if (!a.span.empty()) options.span = length_option(a.span, "--span");
-  const Inspection inspection = inspect(read_iges(a.input), options);
-  if (!a.svg.empty()) {
-    write_file(a.svg, inspect_svg(inspection));
-    console.note("wrote " + a.svg);
+  return options;
+}
+
+int run_convert(const InspectArguments& a, const std::string& target, const Common& common, Console& console) {
+  std::error_code error;
+  if (!common.overwrite && std::filesystem::equivalent(a.input, target, error))
+    throw OutputError(fmt::format("{} is the input; give --overwrite to replace it", target));
+  const PanelFile file = read_panels(a.input);
+  const Conversion conversion = convert(file, target, options_of(a));
+  for (const std::string& warning : conversion.warnings) console.warning(warning);
+  write_file(target, conversion.bytes);
+  std::string notes;
+  for (const std::string& note : conversion.notes) notes += (notes.empty() ? "" : "; ") + note;
+  console.note(fmt::format("wrote {}: {}", target, notes));
+  if (common.json) {
+    const nlohmann::ordered_json out = {{"file", utf8(a.input)},
+                                        {"output", utf8(target)},
+                                        {"panels", file.panels.size()},
+                                        {"bytes", conversion.bytes.size()},
+                                        {"notes", conversion.notes}};
+    fmt::print("{}\n", json_text(out));
   }
+  return exit_ok;
+}
+
+int run_inspect(const InspectArguments& a, const Common& common, Console& console) {
+  const Inspection inspection = inspect(read_panels(a.input), options_of(a));
+  const auto draw = [&](const std::string& target, auto format) {
+    if (target.empty()) return;
+    write_file(target, format(inspection));
+    console.note("wrote " + target);
+  };
+  draw(a.svg, inspect_svg);
+  draw(a.png, inspect_png);
+  draw(a.html, inspect_html);
   if (common.json) {
     fmt::print("{}\n", json_text(inspect_json(inspection), 1));
   } else {
-    fmt::print("{}", inspect_text(inspection));
+    fmt::print("{}", inspect_text(inspection, common.verbose));
   }
   for (const std::string& panel : inspection.refused) console.error(panel);
   return inspection.refused.empty() ? exit_ok : exit_geometry;
 }
 
 int run_roundtrip(const std::string& input, bool rewrite, const Common& common) {
-  const PanelFile file = read_iges(input);
+  const PanelFile file = read_panels(input);
   const RoundtripReport r = roundtrip(file, rewrite ? IgesMode::rewrite : IgesMode::replay);
   if (common.json) {
     nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
@@ -182,6 +221,26 @@ int run_roundtrip(const std::string& input, bool rewrite, const Common& common) 
     for (const std::string& warning : file.warnings) fmt::print("  warning     {}\n", warning);
   }
   return r.exact() ? exit_ok : exit_check;
+}
+
+struct InitArguments {
+  std::string name, output, pattern, body;
+};
+
+int run_init_pattern(const InitArguments& a, const Common& common, Console& console) {
+  if (!a.name.empty()) throw UsageError("give a template or --pattern, not both");
+  std::filesystem::path target = a.output.empty() ? "scene.toml" : a.output;
+  if (target.extension() != ".toml") target /= "scene.toml";
+  if (!common.overwrite && std::filesystem::exists(target)) {
+    throw OutputError(fmt::format("{} exists; give --overwrite to replace it", target.string()));
+  }
+  const auto body = a.body.empty() ? std::nullopt : std::optional<std::filesystem::path>(a.body);
+  const PatternScene scene = pattern_scene(a.pattern, body, target);
+  for (const std::string& warning : scene.warnings) console.warning(warning);
+  write_file(target, scene.text);
+  for (const std::string& note : scene.notes) console.note(note);
+  console.note(fmt::format("wrote {0}; now: toile check {0}", target.string()));
+  return exit_ok;
 }
 
 int run_study_file(const std::string& input, const std::string& directory, const Common& common, Console& console) {
@@ -280,11 +339,17 @@ int run_command(int argc, char** argv) {
       app.add_subcommand("inspect", "Entities, loops, cells and constraint points of a panel file");
   inspect_command->add_option("FILE", inspect_arguments.input)->required();
   inspect_command->add_option("--svg", inspect_arguments.svg, "Draw the panels");
-  inspect_command->add_option("--degree", inspect_arguments.degree, "Degree")->check(CLI::Range(1, 5));
-  auto* span = inspect_command->add_option("--span", inspect_arguments.span, "Longest knot span (\"20 mm\")");
-  inspect_command->add_option("--spans", inspect_arguments.spans, "Spans per direction")
-      ->check(CLI::Range(1, 10000))
-      ->excludes(span);
+  inspect_command->add_option("--png", inspect_arguments.png, "Draw them as a picture");
+  inspect_command->add_option("--html", inspect_arguments.html, "Draw them on a page with tables and warnings");
+  add_refinement(*inspect_command, inspect_arguments);
+
+  InspectArguments convert_arguments;
+  std::string convert_target;
+  CLI::App* convert_command =
+      app.add_subcommand("convert", "Panels to IGES, SVG (1:1), OBJ, PLY, STL, GLB or VTU, by the ending of OUT");
+  convert_command->add_option("IN", convert_arguments.input, "IGES, pattern JSON or DXF")->required();
+  convert_command->add_option("OUT", convert_target)->required();
+  add_refinement(*convert_command, convert_arguments);
 
   std::string roundtrip_input;
   bool rewrite = false;
@@ -303,15 +368,20 @@ int run_command(int argc, char** argv) {
   study_command->add_option("STUDY", study_input, "study.toml")->required();
   study_command->add_option("-o,--output", study_directory, "Directory of the results (default: out/<study name>)");
 
-  std::string template_name, template_directory;
+  InitArguments init_arguments;
   CLI::App* init_command = app.add_subcommand("init", "Write a scene to start from; without a name, list them");
-  init_command->add_option("TEMPLATE", template_name);
-  init_command->add_option("-o,--output", template_directory, "Folder (default: the template's name)");
+  init_command->add_option("TEMPLATE", init_arguments.name);
+  init_command->add_option("-o,--output", init_arguments.output,
+                           "Folder (default: the template's name); with --pattern the scene (default: scene.toml)");
+  auto* pattern =
+      init_command->add_option("--pattern", init_arguments.pattern, "A sewing pattern: a scene of its panels");
+  init_command->add_option("--body", init_arguments.body, "With --pattern: the mesh that wears it, metres, y upwards")
+      ->needs(pattern);
 
   CLI::App* presets_command = app.add_subcommand("presets", "Fabrics that need no table in the scene");
 
-  for (CLI::App* command : {drape_command, inspect_command, roundtrip_command, check_command, study_command,
-                            init_command, presets_command}) {
+  for (CLI::App* command : {drape_command, inspect_command, convert_command, roundtrip_command, check_command,
+                            study_command, init_command, presets_command}) {
     add_common(*command, common);
   }
 
@@ -329,6 +399,7 @@ int run_command(int argc, char** argv) {
   try {
     if (*drape_command) return run_drape(drape_arguments, common, console);
     if (*inspect_command) return run_inspect(inspect_arguments, common, console);
+    if (*convert_command) return run_convert(convert_arguments, convert_target, common, console);
     if (*roundtrip_command) return run_roundtrip(roundtrip_input, rewrite, common);
     if (*check_command) {
       if (std::filesystem::path(check_arguments.input).extension() != ".toml")
@@ -336,7 +407,8 @@ int run_command(int argc, char** argv) {
       return check_scene(scene_of(check_arguments), common.json, console);
     }
     if (*study_command) return run_study_file(study_input, study_directory, common, console);
-    if (*init_command) return run_init(template_name, template_directory, common, console);
+    if (*init_command && !init_arguments.pattern.empty()) return run_init_pattern(init_arguments, common, console);
+    if (*init_command) return run_init(init_arguments.name, init_arguments.output, common, console);
     if (*presets_command) return run_presets(common);
   } catch (const UsageError& error) {
     console.error(error.what());

@@ -94,6 +94,27 @@ std::map<std::string, int> unused(const System& system) {
   return reasons;
 }
 
+// What the scene names and no part of this version simulates: a drape without it would be another one, so it is
+// refused.
+std::vector<std::string> not_simulated(const Scene& scene) {
+  std::vector<std::string> out;
+  const auto add = [&](const auto& tables, const char* key, const char* words) {
+    if (tables.empty()) return;
+    out.push_back(
+        fmt::format("{}: {} are not simulated by this version; drape without the {} [[{}]] table{} with "
+                    "--set '{}=[]'",
+                    tables.front().where, words, tables.size(), key, tables.size() == 1 ? "" : "s", key));
+  };
+  add(scene.seams, "seam", "seams");
+  add(scene.obstacles, "obstacle", "obstacles");
+  return out;
+}
+
+void refuse_not_simulated(const Scene& scene) {
+  const std::vector<std::string> reasons = not_simulated(scene);
+  if (!reasons.empty()) throw InputError(fmt::format("{}", fmt::join(reasons, "\n")));
+}
+
 // "42 s", "3 min", "2.5 h".
 std::string duration(double seconds) {
   if (seconds < 100) return fmt::format("{:.0f} s", seconds);
@@ -110,6 +131,7 @@ bool holds(const std::filesystem::path& directory, const std::filesystem::path& 
 
 int drape(Scene scene, const DrapeOptions& options, Console& console) {
   const Clock::time_point called = Clock::now();
+  refuse_not_simulated(scene);
   const std::filesystem::path directory = options.directory.value_or(std::filesystem::path("out") / scene.name);
   const Build built = build(std::move(scene));
   built.model->use_threads(options.threads);
@@ -215,6 +237,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
 }
 
 int dry_run(Scene scene, bool json, Console& console) {
+  refuse_not_simulated(scene);
   const Build built = build(std::move(scene));
   for (const std::string& warning : built.warnings) console.warning(warning);
   std::unique_ptr<System> system = assemble(built, 0);
@@ -271,6 +294,7 @@ int dry_run(Scene scene, bool json, Console& console) {
 int check_scene(Scene scene, bool json, Console& console) {
   const Build built = build(std::move(scene));
   const std::unique_ptr<System> system = assemble(built, 0);
+  const std::vector<std::string> idle = not_simulated(built.scene);
   if (json) {
     nlohmann::ordered_json out;
     out["scene"] = built.scene.name;
@@ -282,10 +306,12 @@ int check_scene(Scene scene, bool json, Console& console) {
                                {"constraint_points", panel.points.size()}});
     }
     out["warnings"] = built.warnings;
+    out["not_simulated"] = idle;
     fmt::print("{}\n", json_text(out));
     return exit_ok;
   }
   for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& reason : idle) console.warning(reason);
   for (std::size_t k = 0; k < built.panels.size(); ++k) fmt::print("{}\n", describe(built, k));
   fmt::print("{}: valid\n", built.scene.path.string());
   return exit_ok;

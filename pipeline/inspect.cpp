@@ -20,22 +20,6 @@
 namespace toile {
 namespace {
 
-NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) {
-  NurbsSurface surface = face.surface;
-  if (!surface.u().clamped() || !surface.v().clamped()) surface = clamp(surface);
-  if (!options.degree && !options.span && !options.spans) return surface;
-  RefineOptions refinement;
-  refinement.degree = options.degree;
-  if (options.span) refinement.span = *options.span / face.metres_per_unit;
-  if (options.spans) refinement.spans = {*options.spans, *options.spans};
-  refinement.tolerance = same_place(face.resolution, surface);
-  try {
-    return refine(surface, refinement).surface;
-  } catch (const GeometryError& error) {
-    throw GeometryError(fmt::format("{}: panel '{}': {}", face.source, face.name, error.what()));
-  }
-}
-
 // Largest distance in the parameter plane between the end of one curve and the start of the next.
 double gap(const TrimLoop& loop) {
   double largest = 0;
@@ -85,8 +69,8 @@ std::vector<std::string> repair_warnings(const std::vector<LoopRepair>& repairs)
   std::vector<std::string> out;
   for (const auto& [key, group] : groups) {
     const LoopRepair& repair = *group.largest;
-    out.push_back(fmt::format("loop {}: {} at (u, v) = ({}, {})", repair.loop, repair.what, repair.place.x(),
-                              repair.place.y()));
+    out.push_back(
+        fmt::format("loop {}: {} at (u, v) = ({}, {})", repair.loop, repair.what, repair.place.x(), repair.place.y()));
     if (repair.move > 0) out.back() += fmt::format(", by {:.2g}", repair.move);
     if (group.count > 1) out.back() += fmt::format("; {} such, this the largest move", group.count);
   }
@@ -205,37 +189,64 @@ nlohmann::ordered_json panel_json(const InspectedPanel& panel) {
 
 // ---- text ----
 
-std::string panel_text(const InspectedPanel& panel) {
+std::ptrdiff_t used_points(const InspectedPanel& panel) {
+  return std::ranges::count(panel.points, true, &ConstraintPoint::used);
+}
+
+// One line a panel.
+std::string overview(const Inspection& inspection) {
+  std::size_t width = 8;
+  for (const InspectedPanel& panel : inspection.panels)
+    width = std::max(width, std::min<std::size_t>(24, panel.face.name.size()));
+  std::string out = fmt::format("\n  {:<{}}  {:>11}  {:>11}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", "panel", width,
+                                "area m2", "perimeter m", "degree", "net", "cells in/cut/out", "loops", "points used");
+  for (const InspectedPanel& panel : inspection.panels) {
+    const NurbsSurface& surface = panel.face.surface;
+    std::size_t curves = 0;
+    for (const TrimLoop& loop : panel.face.loops) curves += static_cast<std::size_t>(curves_in_file(loop));
+    out +=
+        fmt::format("  {:<{}.{}}  {:>11.6g}  {:>11.6g}  {:>6}  {:>9}  {:>16}  {:>9}  {:>11}\n", panel.face.name, width,
+                    width, area(panel), perimeter(panel),
+                    fmt::format("{}x{}{}", surface.u().degree(), surface.v().degree(), surface.rational() ? "r" : ""),
+                    fmt::format("{}x{}", surface.count_u(), surface.count_v()),
+                    fmt::format("{}/{}/{}", count_cells(panel, CellKind::inside), count_cells(panel, CellKind::cut),
+                                count_cells(panel, CellKind::outside)),
+                    fmt::format("{} ({})", panel.face.loops.size(), curves),
+                    fmt::format("{}/{}", used_points(panel), panel.points.size()));
+  }
+  return out;
+}
+
+// Loops and curves as a scene addresses them.
+std::string curves_text(const InspectedPanel& panel) {
   const NurbsSurface& surface = panel.face.surface;
   const double metre = panel.face.metres_per_unit;
   const Interval du = surface.u().domain(), dv = surface.v().domain();
-  std::string out = fmt::format("\npanel '{}'\n", panel.face.name);
-  out += fmt::format("  surface     degree {} x {}, {} x {} control points ({} carry cloth), {}\n",
-                     surface.u().degree(), surface.v().degree(), surface.count_u(), surface.count_v(),
-                     panel.active_control_points, surface.rational() ? "rational" : "polynomial");
-  out += fmt::format("  domain      u [{}, {}], v [{}, {}]\n", du.min, du.max, dv.min, dv.max);
-  out += fmt::format("  area        {:.6g} m2, perimeter {:.6g} m\n", area(panel), perimeter(panel));
-  out += fmt::format("  cells       {} inside, {} cut, {} outside\n", count_cells(panel, CellKind::inside),
-                     count_cells(panel, CellKind::cut), count_cells(panel, CellKind::outside));
-
-  out += panel.face.natural_bounds ? "\n  The face has no trim; its border counts as loop 0.\n" : "\n";
-  out += "  curve        length m   from (u, v)                 to (u, v)\n";
+  std::string out =
+      fmt::format("\npanel '{}'  u [{:.6g}, {:.6g}]  v [{:.6g}, {:.6g}]{}{}\n", panel.face.name, du.min, du.max, dv.min,
+                  dv.max, panel.face.natural_bounds ? "  no trim: its border is loop 0" : "",
+                  panel.face.marks.empty() ? "" : fmt::format("  {} marks", panel.face.marks.size()));
   for (const auto& [loop, length] : loops_in_file_order(panel)) {
-    out += fmt::format("  {:<12} {:<10.6g} loop {}, gap {:.2g}\n", fmt::format("{}", name(loop->kind)), length * metre,
-                       loop->index, gap_as_read(panel, loop->index));
+    out +=
+        fmt::format("  {:<10} {:>10.6g} m{}\n", name(loop->kind), length * metre,
+                    gap_as_read(panel, loop->index) > 0 ? fmt::format("  gap {:.2g}", gap_as_read(panel, loop->index))
+                                                        : std::string());
     const auto at = static_cast<int>(loop - panel.face.loops.data());
     for (std::size_t c = 0; c < loop->curves.size(); ++c) {
       const TrimCurve& curve = loop->curves[c];
       const double curve_length =
           CurveOnSurface(panel.face, panel.topology, at, static_cast<int>(c), surface).length() * metre;
       const auto place = [](const Eigen::Vector2d& p) { return fmt::format("({:.6g}, {:.6g})", p.x(), p.y()); };
-      out += fmt::format("  {:<12} {:<10.6g} {:<27} {}{}\n", fmt::format("curve:{},{}", loop->index, curve.index),
+      out += fmt::format("  {:<10} {:>10.6g} m  {:<24} {}{}\n", fmt::format("curve:{},{}", loop->index, curve.index),
                          curve_length, place(curve.curve.start()), place(curve.curve.end()),
                          curve.reversed ? "  (run backwards)" : "");
     }
   }
+  return out;
+}
 
-  out += "\n  points         all   used\n";
+std::string points_text(const InspectedPanel& panel) {
+  std::string out = fmt::format("\npoints of '{}'\n  {:<12} {:>5}  {:>5}\n", panel.face.name, "kind", "all", "used");
   for (const PointKind kind : {PointKind::vertex, PointKind::crossing_u, PointKind::crossing_v, PointKind::tangent_u,
                                PointKind::tangent_v, PointKind::crossing_uv}) {
     const auto all = std::ranges::count(panel.points, kind, &ConstraintPoint::kind);
@@ -259,6 +270,22 @@ std::string panel_text(const InspectedPanel& panel) {
 }
 
 }  // namespace
+
+NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) {
+  NurbsSurface surface = face.surface;
+  if (!surface.u().clamped() || !surface.v().clamped()) surface = clamp(surface);
+  if (!options.degree && !options.span && !options.spans) return surface;
+  RefineOptions refinement;
+  refinement.degree = options.degree;
+  if (options.span) refinement.span = *options.span / face.metres_per_unit;
+  if (options.spans) refinement.spans = {*options.spans, *options.spans};
+  refinement.tolerance = same_place(face.resolution, surface);
+  try {
+    return refine(surface, refinement).surface;
+  } catch (const GeometryError& error) {
+    throw GeometryError(fmt::format("{}: panel '{}': {}", face.source, face.name, error.what()));
+  }
+}
 
 Inspection inspect(const PanelFile& file, const InspectOptions& options) {
   Inspection out;
@@ -287,10 +314,14 @@ namespace {
 
 const char* name(Disposition disposition) {
   switch (disposition) {
-    case Disposition::read: return "read";
-    case Disposition::converted: return "converted";
-    case Disposition::kept: return "kept as it is";
-    case Disposition::quarantined: return "quarantined";
+    case Disposition::read:
+      return "read";
+    case Disposition::converted:
+      return "converted";
+    case Disposition::kept:
+      return "kept as it is";
+    case Disposition::quarantined:
+      return "quarantined";
   }
   return "";
 }
@@ -312,6 +343,7 @@ nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger) {
 }
 
 std::string ledger_text(const std::vector<LedgerEntry>& ledger) {
+  if (ledger.empty()) return {};
   struct Row {
     const LedgerEntry* first = nullptr;
     int count = 0;
@@ -341,23 +373,32 @@ nlohmann::ordered_json inspect_json(const Inspection& inspection) {
   for (const std::string& warning : inspection.warnings) warnings.push_back(utf8(warning));
   nlohmann::ordered_json refused = nlohmann::ordered_json::array();
   for (const std::string& panel : inspection.refused) refused.push_back(utf8(panel));
-  return {{"file", utf8(inspection.file)},
-          {"unit", utf8(inspection.unit)},
-          {"exporter", utf8(inspection.exporter)},
-          {"warnings", std::move(warnings)},
-          {"entities", std::move(entities)},
-          {"panels", std::move(panels)},
-          {"refused", std::move(refused)},
-          {"ledger", ledger_json(inspection.ledger)}};
+  return {{"file", utf8(inspection.file)},         {"unit", utf8(inspection.unit)},
+          {"exporter", utf8(inspection.exporter)}, {"warnings", std::move(warnings)},
+          {"entities", std::move(entities)},       {"panels", std::move(panels)},
+          {"refused", std::move(refused)},         {"ledger", ledger_json(inspection.ledger)}};
 }
 
-std::string inspect_text(const Inspection& inspection) {
+std::string inspect_text(const Inspection& inspection, bool points) {
   std::string out = fmt::format("{}  {}{}\n", inspection.file, inspection.unit,
                                 inspection.exporter.empty() ? "" : ", written by " + inspection.exporter);
   out += ledger_text(inspection.ledger);
-  for (const std::string& warning : inspection.warnings) out += "  warning     " + warning + '\n';
-  for (const std::string& panel : inspection.refused) out += "  refused     " + panel + '\n';
-  for (const InspectedPanel& panel : inspection.panels) out += panel_text(panel);
+  constexpr std::size_t shown = 12;
+  for (std::size_t k = 0; k < inspection.warnings.size() && (points || k < shown); ++k) {
+    out += "  warning      " + inspection.warnings[k] + '\n';
+  }
+  if (!points && inspection.warnings.size() > shown) {
+    out += fmt::format("  and {} warnings more: -v lists all\n", inspection.warnings.size() - shown);
+  }
+  for (const std::string& panel : inspection.refused) out += "  refused      " + panel + '\n';
+  if (inspection.panels.empty()) return out + "  no panel\n";
+  out += overview(inspection);
+  for (const InspectedPanel& panel : inspection.panels) out += curves_text(panel);
+  if (points) {
+    for (const InspectedPanel& panel : inspection.panels) out += points_text(panel);
+  } else {
+    out += "\n-v lists the constraint points, --svg, --png or --html draw them\n";
+  }
   return out;
 }
 

@@ -24,6 +24,9 @@ struct InspectOptions {
   std::optional<int> spans;    // per direction
 };
 
+// The face's surface, clamped, with these degrees and knots. Throws GeometryError where they can't be had.
+NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options);
+
 struct InspectedPanel {
   TrimmedSurface face;  // refined as asked, loops valid
   TrimTopology topology;
@@ -41,18 +44,22 @@ struct Inspection {
   std::vector<LedgerEntry> ledger;    // of every entity
   std::vector<std::string> warnings;  // of the file, then of the panels
   std::vector<InspectedPanel> panels;
-  std::vector<std::string> refused;   // panels without a valid trim: panel, loop and place
+  std::vector<std::string> refused;  // panels without a valid trim: panel, loop and place
 };
 
 // Throws GeometryError where no panel has a valid trim, with panel, loop and place of the first.
 Inspection inspect(const PanelFile& file, const InspectOptions& options = {});
 
-// The ledger by kind of entity and what became of it, with the first reason and its line; for programs, every entity.
+// The ledger by kind of entity and what became of it, with the first reason and its line (empty for a file
+// without entities); for programs, every entity.
 std::string ledger_text(const std::vector<LedgerEntry>& ledger);
 nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger);
 
-std::string inspect_text(const Inspection& inspection);
+// A table of the panels and their curves; `points`: with the constraint points one by one.
+std::string inspect_text(const Inspection& inspection, bool points = false);
 nlohmann::ordered_json inspect_json(const Inspection& inspection);  // the contract of design.md
 std::string inspect_svg(const Inspection& inspection);
+std::string inspect_png(const Inspection& inspection);   // the same drawing
+std::string inspect_html(const Inspection& inspection);  // a page of its own: the drawing, tables, warnings
 
 }  // namespace toile

@@ -1,7 +1,6 @@
 // The drawing of `toile inspect --svg`.
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -9,6 +8,7 @@
 #include <functional>
 
 #include "io/polyline.h"
+#include "pipeline/drawing_plane.h"
 #include "pipeline/inspect.h"
 #include "pipeline/svg.h"
 
@@ -36,6 +36,7 @@ constexpr std::string_view style_sheet =
     ".u-label{fill:#c0392b;font-style:italic;font-weight:bold}\n"
     ".v-label{fill:#1e8449;font-style:italic;font-weight:bold}\n"
     ".grain{fill:#5b6775;stroke:#5b6775;stroke-width:1.4}\n"
+    ".mark{fill:none;stroke:#8e5a1d;stroke-width:1.1}\n.mark-text{fill:#8e5a1d}\n"
     ".warning{fill:#d35400;stroke:#ffffff;stroke-width:.8}\n.warning-text{fill:#b04600}\n";
 
 struct Marker {
@@ -83,22 +84,9 @@ struct Sheet {
 Sheet sheet_of(const TrimmedSurface& face) {
   const NurbsSurface& surface = face.surface;
   const double metre = face.metres_per_unit;
-  const Vector3d centre = surface.points().rowwise().mean();
-  const Eigen::Matrix3Xd spread = surface.points().colwise() - centre;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread * spread.transpose());
-  Vector3d normal = axes.eigenvectors().col(0);
-  const double size = spread.colwise().norm().maxCoeff();
-  if ((normal.transpose() * spread).cwiseAbs().maxCoeff() <= 1e-6 * size) {
-    const Interval u = surface.u().domain(), v = surface.v().domain();
-    const SurfaceJet jet = evaluate(surface, (u.min + u.max) / 2, (v.min + v.max) / 2);
-    if (jet.u.cross(jet.v).dot(normal) < 0) normal = -normal;
-    // A panel in a coordinate plane keeps its axes, so that the drawing shows the file's own coordinates.
-    Vector3d right = std::abs(normal.z()) > 0.9999 ? Vector3d(normal.z() > 0 ? 1 : -1, 0, 0) : Vector3d(jet.u);
-    right = (right - right.dot(normal) * normal).normalized();
-    const Vector3d up = normal.cross(right);
-    return {[&surface, metre, right, up](const Vector2d& p) -> Vector2d {
-              const Vector3d x = surface(p.x(), p.y());
-              return metre * Vector2d(x.dot(right), x.dot(up));
+  if (const std::optional<DrawingPlane> plane = drawing_plane(surface)) {
+    return {[&surface, metre, plane = *plane](const Vector2d& p) -> Vector2d {
+              return metre * plane(surface(p.x(), p.y()));
             },
             true};
   }
@@ -362,7 +350,10 @@ void draw_grain(Svg& svg, const Drawn& at) {
   if (highest == -1e300) return;
   const Interval u = at.face().surface.u().domain(), v = at.face().surface.v().domain();
   const Vector2d centre = at(best);
-  const Vector2d weft = (at(best + Vector2d(1e-4 * u.length(), 0)) - centre).stableNormalized();
+  const Vector2d along_u = (at(best + Vector2d(1e-4 * u.length(), 0)) - centre).stableNormalized();
+  // The drawing's y runs down, so that a turn from u towards v is a turn to the left on it.
+  const double turn = grain_angle(at.face()).value_or(0);
+  const Vector2d weft = std::cos(turn) * along_u + std::sin(turn) * Vector2d(along_u.y(), -along_u.x());
   // Warp is at right angles to weft in the cloth, on the side of v.
   Vector2d warp(-weft.y(), weft.x());
   if (warp.dot(at(best + Vector2d(0, 1e-4 * v.length())) - centre) < 0) warp = -warp;
@@ -452,9 +443,29 @@ std::string title_of(const InspectedPanel& panel, std::size_t number) {
   return panel.face.name.empty() ? fmt::format("panel {}", number) : panel.face.name;
 }
 
-}  // namespace
+struct Drawing {
+  Svg svg;
+  double width = 0, height = 0;
+};
 
-std::string inspect_svg(const Inspection& inspection) {
+// Marks of the pattern; the grain line shows as the panel's grain.
+void draw_marks(Svg& svg, const Drawn& at) {
+  for (const PanelMark& mark : at.face().marks) {
+    const Vector2d place = at(mark.at);
+    if (mark.kind == MarkKind::text) {
+      svg.text(place, 10, mark.text, "mark-text halo", TextAnchor::start);
+    } else if (mark.curve) {
+      TrimCurve line;
+      line.curve = *mark.curve;
+      svg.path(svg_path(simplified(trim_line(at, line)), false), "mark");
+    } else {
+      svg.line(place - Vector2d(4, 0), place + Vector2d(4, 0), "mark");
+      svg.line(place - Vector2d(0, 4), place + Vector2d(0, 4), "mark");
+    }
+  }
+}
+
+Drawing draw(const Inspection& inspection) {
   constexpr double margin = 70, head = 92, foot = 74, largest = 720, row_width = 2400;
   std::vector<Drawn> drawn;
   Vector2d size(0, 0);
@@ -511,6 +522,7 @@ std::string inspect_svg(const Inspection& inspection) {
     draw_addresses(svg, at);
     draw_trims(svg, at);
     draw_points(svg, at);
+    draw_marks(svg, at);
     draw_grain(svg, at);
     draw_warnings(svg, at);
     double line = at.origin.y() + 66;
@@ -530,7 +542,19 @@ std::string inspect_svg(const Inspection& inspection) {
   if (!drawn.empty()) draw_ruler(svg, {24, y + 8}, scale, width);
   draw_legend(svg, {28, y + 44}, width - 20);
   const double columns = std::max(1.0, std::floor((width - 20) / 270));
-  return svg.finish(width, y + 44 + 20 * std::ceil(12 / columns) + 16, inspection.file, style_sheet);
+  return {std::move(svg), width, y + 44 + 20 * std::ceil(12 / columns) + 16};
+}
+
+}  // namespace
+
+std::string inspect_svg(const Inspection& inspection) {
+  const Drawing drawing = draw(inspection);
+  return drawing.svg.finish(drawing.width, drawing.height, inspection.file, style_sheet);
+}
+
+std::string inspect_png(const Inspection& inspection) {
+  const Drawing drawing = draw(inspection);
+  return svg_png(drawing.svg, drawing.width, drawing.height, style_sheet);
 }
 
 }  // namespace toile

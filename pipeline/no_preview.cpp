@@ -1,5 +1,6 @@
 #include "geometry/error.h"
 #include "pipeline/preview.h"
+#include "pipeline/svg.h"
 
 namespace toile {
 
@@ -9,6 +10,10 @@ bool preview_available() {
 
 std::string preview_png(const Frame&, const PreviewOptions&) {
   throw OutputError("this program was built without Embree and stb: it draws no preview");
+}
+
+std::string svg_png(const Svg&, double, double, std::string_view) {
+  throw OutputError("this program was built without Embree and stb: it writes no PNG; use --svg");
 }
 
 }  // namespace toile

@@ -11,7 +11,7 @@
 
 #include "geometry/error.h"
 #include "io/file.h"
-#include "io/iges.h"
+#include "io/panel_file.h"
 #include "pipeline/toml_table.h"
 #include "pipeline/units.h"
 
@@ -37,31 +37,6 @@ std::vector<std::string> split_path(const std::string& path, const std::string& 
   if (!part.empty()) parts.push_back(part);
   if (parts.empty()) throw InputError(fmt::format("--set {}: expected key=value", setting));
   return parts;
-}
-
-// toml++ bounds how deep values nest, not how many parts a dotted key has, and it frees tables by recursion.
-constexpr int deepest_key = 16;
-void refuse_deep_keys(std::string_view text, const std::string& file) {
-  int line = 1, dots = 0;
-  char quote = 0, previous = 0;
-  for (const char c : text) {
-    if (c == '\n') {
-      ++line;
-      dots = quote = previous = 0;
-    } else if (quote != 0) {
-      if (c == quote && quote != '#') quote = 0;
-    } else if (c == '.' && previous != 0) {
-      if (++dots >= deepest_key)
-        throw InputError(fmt::format("{}:{}: a key has more than {} parts", file, line, deepest_key));
-      previous = 0;
-    } else if (c == '"' || c == '\'' || c == '#') {
-      quote = previous = c;
-    } else if (c != ' ' && c != '\t') {
-      const bool in_key = std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-';
-      previous = in_key ? c : '\0';
-      if (!in_key) dots = 0;
-    }
-  }
 }
 
 void assign(toml::table& root, const std::string& setting) {
@@ -225,16 +200,19 @@ ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fab
   ScenePanel panel;
   panel.where = table.where();
   panel.name = table.string("name").value_or("");
-  if (table.find("pattern")) {
-    table.fail(*table.raw().get("pattern"),
-               "pattern files are not supported by this version; use file = \"panel.igs\"");
+  const char* key = "file";
+  auto file = table.string(key);
+  if (const auto pattern = table.string("pattern")) {
+    if (file) table.fail(*table.raw().get("pattern"), "a panel has a file or a pattern, not both");
+    file = pattern;
+    key = "pattern";
   }
-  const auto file = table.string("file");
-  if (!file) table.missing("file", "the IGES file that holds the panel, relative to the scene");
+  if (!file)
+    table.missing("file", "the IGES file (or pattern = a sewing pattern) that holds the panel, relative to the scene");
   panel.file = beside(scene, *file);
   std::error_code error;
   if (!std::filesystem::exists(panel.file, error)) {
-    table.fail(*table.raw().get("file"), fmt::format("file '{}' does not exist", panel.file.string()));
+    table.fail(*table.raw().get(key), fmt::format("{} '{}' does not exist", key, panel.file.string()));
   }
   panel.start = table.string("start");
   if (auto refine = table.table("refine", "refine")) {
@@ -247,7 +225,7 @@ ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fab
     }
     refine->done();
   }
-  table.number(panel.grain, "grain_deg", dimension::angle, Range::any, degree_in_radians);
+  panel.grain = table.number("grain_deg", dimension::angle, Range::any, degree_in_radians);
   if (auto place = table.table("place", "place")) panel.place = read_placement(*place);
   panel.fabric_name = table.string("fabric").value_or("kidnapped");
   const Fabric* fabric = fabrics.find(panel.fabric_name);
@@ -285,28 +263,30 @@ Address address(Table& table, const std::string& key) {
   }
 }
 
+PinMotion read_motion(Table& move) {
+  PinMotion motion;
+  if (const auto v = move.vector<3>("translate", dimension::length)) motion.translate = *v;
+  if (const auto v = move.vector<3>("rotate_deg", dimension::angle, degree_in_radians)) motion.rotate = *v;
+  motion.centre = move.vector<3>("centre", dimension::length);
+  move.number(motion.start, "start", dimension::time, Range::nonnegative);
+  const auto end = move.number("end", dimension::time, Range::positive);
+  if (!end) move.missing("end", "the time at which the motion is complete");
+  motion.end = *end;
+  if (!(motion.start < motion.end)) {
+    move.fail(*move.raw().get("end"),
+              fmt::format("end in move is {} s, must come after start = {} s", motion.end, motion.start));
+  }
+  move.done();
+  return motion;
+}
+
 ScenePin read_pin(Table table, const std::vector<ScenePanel>& panels) {
   ScenePin pin;
   pin.where = table.where();
   pin.panel = panel_key(table, panels);
   pin.at = address(table, "at");
   pin.clamp = table.boolean("clamp").value_or(false);
-  if (auto move = table.table("move", "move")) {
-    PinMotion motion;
-    if (const auto v = move->vector<3>("translate", dimension::length)) motion.translate = *v;
-    if (const auto v = move->vector<3>("rotate_deg", dimension::angle, degree_in_radians)) motion.rotate = *v;
-    motion.centre = move->vector<3>("centre", dimension::length);
-    move->number(motion.start, "start", dimension::time, Range::nonnegative);
-    const auto end = move->number("end", dimension::time, Range::positive);
-    if (!end) move->missing("end", "the time at which the motion is complete");
-    motion.end = *end;
-    if (!(motion.start < motion.end)) {
-      move->fail(*move->raw().get("end"),
-                 fmt::format("end in move is {} s, must come after start = {} s", motion.end, motion.start));
-    }
-    move->done();
-    pin.move = motion;
-  }
+  if (auto move = table.table("move", "move")) pin.move = read_motion(*move);
   pin.release = table.number("release", dimension::time, Range::nonnegative);
   table.done();
   return pin;
@@ -326,6 +306,59 @@ SceneTraction read_traction(Table table, const std::vector<ScenePanel>& panels) 
   traction.force = *force;
   table.done();
   return traction;
+}
+
+SeamSide read_seam_side(Table& seam, const char* key, const std::vector<ScenePanel>& panels) {
+  auto table = seam.table(key, fmt::format("{} of [[seam]]", key));
+  if (!table) seam.missing(key, "one side, such as { panel = \"front\", loop = 0, curve = 1 }");
+  SeamSide side;
+  side.panel = panel_key(*table, panels);
+  side.loop = table->integer("loop", 0, 1000000).value_or(0);
+  const auto curve = table->integer("curve", 0, 1000000);
+  if (!curve) table->missing("curve", "its number in the loop; toile inspect shows it");
+  side.curve = *curve;
+  side.reverse = table->boolean("reverse").value_or(false);
+  table->done();
+  return side;
+}
+
+SceneSeam read_seam(Table table, const std::vector<ScenePanel>& panels) {
+  SceneSeam seam;
+  seam.where = table.where();
+  seam.a = read_seam_side(table, "a", panels);
+  seam.b = read_seam_side(table, "b", panels);
+  table.done();
+  if (seam.a.panel == seam.b.panel && seam.a.loop == seam.b.loop && seam.a.curve == seam.b.curve) {
+    throw InputError(fmt::format("{}: the seam joins curve {},{} of panel '{}' with itself", seam.where, seam.a.loop,
+                                 seam.a.curve, seam.a.panel));
+  }
+  return seam;
+}
+
+SceneObstacle read_obstacle(Table table, const std::filesystem::path& scene) {
+  SceneObstacle obstacle;
+  obstacle.where = table.where();
+  const auto mesh = table.string("mesh");
+  if (!mesh) table.missing("mesh", "a file of triangles, relative to the scene");
+  obstacle.mesh = beside(scene, *mesh);
+  std::error_code error;
+  if (!std::filesystem::exists(obstacle.mesh, error)) {
+    table.fail(*table.raw().get("mesh"), fmt::format("mesh '{}' does not exist", obstacle.mesh.string()));
+  }
+  if (const auto unit = table.string("unit")) {
+    try {
+      obstacle.metres_per_unit = parse_quantity("1 " + *unit, dimension::length);
+    } catch (const InputError&) {
+      table.fail(*table.raw().get("unit"),
+                 fmt::format("unit is \"{}\", must be a length unit such as \"m\" or \"cm\"", *unit));
+    }
+  }
+  if (auto place = table.table("place", "place")) obstacle.place = read_placement(*place);
+  table.number(obstacle.friction, "friction", dimension::none, Range::nonnegative);
+  table.number(obstacle.thickness, "thickness", dimension::length, Range::nonnegative);
+  if (auto move = table.table("move", "move")) obstacle.move = read_motion(*move);
+  table.done();
+  return obstacle;
 }
 
 void read_output(Table table, Scene& scene) {
@@ -471,11 +504,9 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   scene.path = path;
   scene.name = scene_name(path);
   Table top(root, "the scene", path.string());
-  for (const char* key : {"seam", "obstacle", "contact_pair"}) {
-    top.refuse(key, fmt::format("[[{}]] is not supported by this version, which drapes panels with pins, tractions, "
-                                "gravity and wind",
-                                key));
-  }
+  top.refuse("contact_pair",
+             "[[contact_pair]] is not supported by this version, which drapes panels with pins, "
+             "tractions, gravity and wind");
   Fabrics fabrics;
   if (auto table = top.table("fabric", "[fabric]")) {
     for (const auto& [name, node] : table->raw()) {
@@ -502,6 +533,8 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   for (Table& table : top.tables("traction", "[[traction]]")) {
     scene.tractions.push_back(read_traction(table, scene.panels));
   }
+  for (Table& table : top.tables("seam", "[[seam]]")) scene.seams.push_back(read_seam(table, scene.panels));
+  for (Table& table : top.tables("obstacle", "[[obstacle]]")) scene.obstacles.push_back(read_obstacle(table, path));
   read_settings(top, scene);
   snap_releases(scene);
   top.done();
@@ -529,7 +562,6 @@ Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vec
 }
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
-  refuse_deep_keys(text, path.string());
   toml::table root = parse_toml(text, path);
   return read_tables(root, path, settings);
 }
@@ -539,7 +571,7 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
 }
 
 Scene quick_scene(const QuickScene& request, std::span<const std::string> settings) {
-  const PanelFile file = read_iges(request.file);
+  const PanelFile file = read_panels(request.file);
   const auto has = [&](const std::string& name) {
     return std::ranges::any_of(file.panels, [&](const TrimmedSurface& face) { return face.name == name; });
   };

@@ -23,16 +23,16 @@ struct Placement {
 };
 
 struct ScenePanel {
-  std::string name;   // a face of the file by its name, else by its order
-  bool named = true;  // false: `name` was made up, the face is taken by its order
-  int order = 0;      // of this panel among those of the scene that come from the same file
-  std::filesystem::path file;
+  std::string name;                  // a face of the file by its name, else by its order
+  bool named = true;                 // false: `name` was made up, the face is taken by its order
+  int order = 0;                     // of this panel among those of the scene that come from the same file
+  std::filesystem::path file;        // IGES or pattern
   std::optional<std::string> start;  // face of the same file and knots whose net is the initial place; else the rest
   std::optional<int> degree;
   std::optional<double> span;  // m
   std::optional<std::array<int, 2>> spans, control_points;
-  double grain = 0;  // rad
-  Placement place;   // of the rest and of the start
+  std::optional<double> grain;  // rad; unset: the panel's grain line, else 0
+  Placement place;              // of the rest and of the start
   Fabric fabric;
   std::string fabric_name;
   std::string where;  // "scene.toml:12", for messages
@@ -64,6 +64,27 @@ struct SceneTraction {
   std::string where;
 };
 
+// A curve of a panel that is sewn; the seam runs from the curve's start to its end, or against it.
+struct SeamSide {
+  std::string panel;
+  int loop = 0, curve = 0;  // the file's numbers
+  bool reverse = false;
+};
+// Read and checked; not simulated yet.
+struct SceneSeam {
+  SeamSide a, b;
+  std::string where;
+};
+struct SceneObstacle {
+  std::filesystem::path mesh;
+  double metres_per_unit = 1;
+  Placement place;
+  double friction = 0.3;
+  double thickness = 0;  // m
+  std::optional<PinMotion> move;
+  std::string where;
+};
+
 struct StrainLimit {
   bool on = false;
   double tolerance = 0.01;
@@ -89,6 +110,8 @@ struct Scene {
   std::vector<ScenePanel> panels;  // empty: all panels of `panel_file`
   std::vector<ScenePin> pins;
   std::vector<SceneTraction> tractions;
+  std::vector<SceneSeam> seams;
+  std::vector<SceneObstacle> obstacles;
   StrainLimit strain_limit;
   Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
   Eigen::Vector3d wind{0, 0, 0};         // m/s

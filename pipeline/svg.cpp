@@ -52,20 +52,16 @@ std::string attributes(std::string_view style) {
 }  // namespace
 
 void Svg::path(const std::string& data, std::string_view style) {
-  body_ += "<path" + attributes(style) + " d=\"" + data + "\"/>\n";
+  items_.push_back({SvgItem::Kind::path, data, std::string(style)});
 }
 
 void Svg::circle(const Eigen::Vector2d& centre, double radius, std::string_view style) {
-  body_ += "<circle" + attributes(style) + " cx=\"" + svg_number(centre.x()) + "\" cy=\"" + svg_number(centre.y()) +
-           "\" r=\"" + svg_number(radius) + "\"/>\n";
+  items_.push_back({SvgItem::Kind::circle, {}, std::string(style), centre, radius});
 }
 
 void Svg::text(const Eigen::Vector2d& at, double size, std::string_view words, std::string_view style,
                TextAnchor anchor) {
-  static constexpr std::array<const char*, 3> names{"start", "middle", "end"};
-  body_ += "<text" + attributes(style) + " x=\"" + svg_number(at.x()) + "\" y=\"" + svg_number(at.y()) +
-           "\" font-size=\"" + svg_number(size) + "\" text-anchor=\"" + names[static_cast<std::size_t>(anchor)] +
-           "\">" + svg_escape(words) + "</text>\n";
+  items_.push_back({SvgItem::Kind::text, std::string(words), std::string(style), at, size, anchor});
 }
 
 void Svg::line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, std::string_view style) {
@@ -83,17 +79,43 @@ void Svg::arrow_head(const Eigen::Vector2d& tip, const Eigen::Vector2d& directio
 }
 
 void Svg::open_group(std::string_view title) {
-  body_ += "<g><title>" + svg_escape(title) + "</title>\n";
+  items_.push_back({SvgItem::Kind::open_group, std::string(title), {}});
 }
 void Svg::close_group() {
-  body_ += "</g>\n";
+  items_.push_back({SvgItem::Kind::close_group, {}, {}});
 }
 
 std::string Svg::finish(double width, double height, std::string_view title, std::string_view style_sheet) const {
+  static constexpr std::array<const char*, 3> anchors{"start", "middle", "end"};
+  std::string body;
+  for (const SvgItem& item : items_) {
+    const std::string style = attributes(item.style);
+    const auto place = [&](const char* x, const char* y) {
+      return std::string(" ") + x + "=\"" + svg_number(item.at.x()) + "\" " + y + "=\"" + svg_number(item.at.y()) + '"';
+    };
+    switch (item.kind) {
+      case SvgItem::Kind::path:
+        body += "<path" + style + " d=\"" + item.words + "\"/>\n";
+        break;
+      case SvgItem::Kind::circle:
+        body += "<circle" + style + place("cx", "cy") + " r=\"" + svg_number(item.size) + "\"/>\n";
+        break;
+      case SvgItem::Kind::text:
+        body += "<text" + style + place("x", "y") + " font-size=\"" + svg_number(item.size) + "\" text-anchor=\"" +
+                anchors[static_cast<std::size_t>(item.anchor)] + "\">" + svg_escape(item.words) + "</text>\n";
+        break;
+      case SvgItem::Kind::open_group:
+        body += "<g><title>" + svg_escape(item.words) + "</title>\n";
+        break;
+      case SvgItem::Kind::close_group:
+        body += "</g>\n";
+        break;
+    }
+  }
   const std::string size = svg_number(width) + "\" height=\"" + svg_number(height);
   return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + size + "\" viewBox=\"0 0 " + svg_number(width) + ' ' +
          svg_number(height) + "\">\n<title>" + svg_escape(title) + "</title>\n<style>\n" + std::string(style_sheet) +
-         "</style>\n<rect width=\"" + size + "\" fill=\"#ffffff\"/>\n" + body_ + "</svg>\n";
+         "</style>\n<rect width=\"" + size + "\" fill=\"#ffffff\"/>\n" + body + "</svg>\n";
 }
 
 }  // namespace toile

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace toile {
 
@@ -17,9 +18,20 @@ std::string svg_path(std::span<const Eigen::Vector2d> points, bool closed);
 
 enum class TextAnchor { start, middle, end };
 
+// What a drawing consists of, in drawing order.
+struct SvgItem {
+  enum class Kind { path, circle, text, open_group, close_group };
+  Kind kind = Kind::path;
+  std::string words;  // path data as of svg_path, text, title of a group
+  std::string style;
+  Eigen::Vector2d at{0, 0};
+  double size = 0;  // radius, height of the font
+  TextAnchor anchor = TextAnchor::middle;
+};
+
 class Svg {
  public:
-  // `style`: class names of the sheet in svg.cpp, or attributes.
+  // `style`: class names of the style sheet, or attributes.
   void path(const std::string& data, std::string_view style);
   void circle(const Eigen::Vector2d& centre, double radius, std::string_view style);
   void text(const Eigen::Vector2d& at, double size, std::string_view words, std::string_view style,
@@ -30,10 +42,16 @@ class Svg {
   void open_group(std::string_view title);
   void close_group();
 
+  std::span<const SvgItem> items() const { return items_; }
   std::string finish(double width, double height, std::string_view title, std::string_view style_sheet) const;
 
  private:
-  std::string body_;
+  std::vector<SvgItem> items_;
 };
+
+// The drawing as a picture, PNG bytes: rules `.name{key:value;...}` of the style sheet and attributes of the items;
+// fill, fill-opacity, fill-rule, stroke and stroke-width are followed, dashes are not. Throws OutputError where the
+// program was built without stb, and above a hundred million pixels.
+std::string svg_png(const Svg& svg, double width, double height, std::string_view style_sheet);
 
 }  // namespace toile

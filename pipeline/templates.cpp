@@ -44,18 +44,8 @@ refine = { degree = 2, span = "40 mm" }
 grain_deg = 0                                 # weft against the u direction
 fabric = "cotton"
 
-[fabric.cotton]
-density = "120 g/m2"
-thickness = "0.4 mm"
-membrane = { weft = 12, warp = 12, shear = 4.8 }         # N/m; the strain limit does the rest
-bending = { b0 = 5e-5, kappa0 = 30, kappa_reg = 0.03 }   # N m, 1/m, 1/m
-drag = 0.25                                              # kg/(m2 s)
-
-[strain_limit]
-mode = "inextensible"                         # or "off"
-tolerance = 0.01
-
-)" + pins +
+)" + fabric_tables() +
+         "\n" + pins +
          R"(
 [load]
 gravity = [0, 0, -9.81]
@@ -101,6 +91,20 @@ TrimmedSurface skirt() {
 }
 
 }  // namespace
+
+std::string fabric_tables() {
+  return R"([fabric.cotton]
+density = "120 g/m2"
+thickness = "0.4 mm"
+membrane = { weft = 12, warp = 12, shear = 4.8 }         # N/m; the strain limit does the rest
+bending = { b0 = 5e-5, kappa0 = 30, kappa_reg = 0.03 }   # N m, 1/m, 1/m
+drag = 0.25                                              # kg/(m2 s)
+
+[strain_limit]
+mode = "inextensible"                         # or "off"
+tolerance = 0.01
+)";
+}
 
 std::span<const SceneTemplate> scene_templates() {
   static const std::array<SceneTemplate, 2> templates = {

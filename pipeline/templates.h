@@ -18,4 +18,7 @@ struct TemplateFile {
 };
 std::vector<TemplateFile> scene_template(const std::string& name);
 
+// [fabric.cotton] and [strain_limit], with comments.
+std::string fabric_tables();
+
 }  // namespace toile

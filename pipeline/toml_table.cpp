@@ -35,7 +35,31 @@ std::string expected(const Dimension& dimension) {
 
 }  // namespace
 
+void refuse_deep_keys(std::string_view text, const std::string& file) {
+  int line = 1, dots = 0;
+  char quote = 0, previous = 0;
+  for (const char c : text) {
+    if (c == '\n') {
+      ++line;
+      dots = quote = previous = 0;
+    } else if (quote != 0) {
+      if (c == quote && quote != '#') quote = 0;
+    } else if (c == '.' && previous != 0) {
+      if (++dots >= deepest_key)
+        throw InputError(fmt::format("{}:{}: a key has more than {} parts", file, line, deepest_key));
+      previous = 0;
+    } else if (c == '"' || c == '\'' || c == '#') {
+      quote = previous = c;
+    } else if (c != ' ' && c != '\t') {
+      const bool in_key = std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-';
+      previous = in_key ? c : '\0';
+      if (!in_key) dots = 0;
+    }
+  }
+}
+
 toml::table parse_toml(std::string_view text, const std::filesystem::path& path) {
+  refuse_deep_keys(text, path.string());
   try {
     return toml::parse(text, path.string());
   } catch (const toml::parse_error& error) {

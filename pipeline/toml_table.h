@@ -25,6 +25,11 @@ struct UnknownKeyError : InputError {
   using InputError::InputError;
 };
 
+// toml++ bounds how deep values nest, not how many parts a dotted key has, and it frees tables by recursion: longer
+// keys throw InputError `file:line: what` before it reads them.
+constexpr int deepest_key = 16;
+void refuse_deep_keys(std::string_view text, const std::string& file);
+
 // Throws InputError `file:line: what` where the text is no TOML.
 toml::table parse_toml(std::string_view text, const std::filesystem::path& path);
 

@@ -1,4 +1,4 @@
-// Entities 124 (transformation), 314 (colour), 406 form 15 (name). [IGES 5.3, 4.21, 4.77, 4.98]
+// Entities 124 (transformation), 212 (general note), 314 (colour), 406 form 15 (name). [IGES 5.3, 4.21, 4.60, 4.77, 4.98]
 #include "io/iges/entity.h"
 
 namespace toile::iges {
@@ -17,6 +17,26 @@ void write(const Eigen::Affine3d& t, Record& out) {
     for (int column = 0; column < 3; ++column) out.real(t.linear()(row, column));
     out.real(t.translation()[row]);
   }
+}
+
+std::vector<NoteString> read_note(Parameters& in) {
+  constexpr long long width = 12;
+  const int n = in.integer("NS");
+  if (n < 1) in.fail("NS is " + std::to_string(n) + ", must be positive");
+  in.expect(width * n, std::to_string(n) + " strings");
+  std::vector<NoteString> strings;
+  for (int i = 0; i < n; ++i) {
+    NoteString line;
+    in.integer("NC");
+    for (const char* what : {"WT", "HT"}) in.real(what);
+    in.integer("FC", 1);
+    for (const char* what : {"SL", "A"}) in.real(what);
+    for (const char* what : {"M", "VH"}) in.integer(what);
+    for (int axis = 0; axis < 3; ++axis) line.at[axis] = in.real("coordinate of the text");
+    line.text = in.text("text");
+    strings.push_back(std::move(line));
+  }
+  return strings;
 }
 
 Colour read_colour(Parameters& in) {

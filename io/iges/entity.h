@@ -97,6 +97,13 @@ PowerSurface read_power_surface(Parameters& in);
 void write(const PowerSurface& surface, Record& out);
 NurbsSurface to_surface(const PowerSurface& surface);
 
+// 212: the strings of a general note, each where it begins. [IGES 5.3, 4.60]
+struct NoteString {
+  Eigen::Vector3d at{0, 0, 0};
+  std::string text;
+};
+std::vector<NoteString> read_note(Parameters& in);
+
 // 102: directory numbers of its curves, in order.
 std::vector<int> read_composite(Parameters& in);
 void write_composite(const std::vector<int>& curves, Record& out);

@@ -1,6 +1,7 @@
 // From records to panels: follows the pointers of faces, boundaries and curves, keeps the ledger, quarantines what is
 // bad.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -14,6 +15,7 @@
 #include "io/iges/face.h"
 #include "io/iges/surfaces.h"
 #include "io/iges/topology.h"
+#include "io/outlines.h"
 
 namespace toile {
 
@@ -65,6 +67,8 @@ class Reader {
   void find_used_surfaces(std::set<int>& used);
   bool endless(const Entry& e) const;
   void finish_names();
+  bool holds_faces() const;
+  void read_outlines();
   void note(const Entry& e, const std::string& kind, const std::string& what) {
     notes_.add(kind, file_.place(e) + what);
   }
@@ -853,6 +857,83 @@ void Reader::finish_names() {
   }
 }
 
+bool Reader::holds_faces() const {
+  constexpr std::array<int, 19> types{108, 114, 118, 120, 122, 128, 140, 141, 142, 143,
+                                      144, 186, 190, 192, 194, 196, 198, 510, 514};
+  return std::ranges::any_of(file_.entries,
+                             [&](const Entry& e) { return std::ranges::find(types, e.type) != types.end(); });
+}
+
+// A drawing without any face: closed plane outlines are panels. (iges.md, 12)
+void Reader::read_outlines() {
+  std::set<int> parts;  // of composite curves and of definitions
+  for (const Entry& e : file_.entries) {
+    if (e.type != 102 && e.type != 308) continue;
+    try {
+      Parameters in(file_, e);
+      for (const int sequence : e.type == 102 ? read_composite(in) : read_definition(in).members)
+        parts.insert(sequence);
+    } catch (const InputError&) {
+      // Reported where the entity itself is read.
+    }
+  }
+  std::map<std::string, int> names;
+  std::vector<LooseCurve> curves;
+  std::vector<LoosePoint> points;
+  for (const Entry& e : file_.entries) {
+    const Kind* kind = find_kind(e.type);
+    const bool curve = e.type == 102 || e.type == 130 || (kind && kind->curve);
+    const bool drawing = e.type == 106 && e.form >= 20 && e.form != 63;  // centre lines, hatching, witness lines
+    if (parts.count(e.sequence) != 0 || drawing || !(curve || e.type == 116 || e.type == 212)) continue;
+    try {
+      Parameters in(file_, e, &notes_);
+      const auto add_point = [&](const Eigen::Vector3d& at, const std::string& words) {
+        points.push_back({e.sequence, e.label, transform(e) * at, words});
+        mark(e, Disposition::read);
+      };
+      if (e.type == 116) {
+        add_point(read_point(in).x, "");
+      } else if (e.type == 212) {
+        for (const NoteString& line : read_note(in)) add_point(line.at, line.text);
+      } else if (e.type == 106 && e.form <= 3) {
+        const CopiousData data = read_copious(in);
+        const std::size_t width = data.kind == 1 ? 2 : data.kind == 2 ? 3 : 6;
+        for (std::size_t k = 0; k + width <= data.numbers.size(); k += width)
+          add_point({data.numbers[k], data.numbers[k + 1], data.kind == 1 ? data.height : data.numbers[k + 2]}, "");
+      } else {
+        LooseCurve loose{e.sequence, {}, this->curves(e.sequence, e, "curve")};
+        // The pointers to properties stand behind the entity's own parameters.
+        if (kind && kind->curve) {
+          kind->curve(in);
+          loose.name = name_property(in);
+        } else if (e.type == 102) {
+          read_composite(in);
+          loose.name = name_property(in);
+        }
+        if (loose.name.empty()) loose.name = e.label;
+        ++names[loose.name];
+        curves.push_back(std::move(loose));
+      }
+    } catch (const Error& error) {
+      quarantine(e, error.what());
+    }
+  }
+  if (curves.empty()) return;
+  Outlines found = find_outlines(std::move(curves), points, out_.resolution);
+  for (const OutlineNote& n : found.notes) note(*file_.find(n.id), "outline " + n.what, n.what);
+  for (std::size_t k = 0; k < found.panels.size(); ++k) {
+    TrimmedSurface& panel = found.panels[k];
+    const Entry& e = *file_.find(found.ids[k]);
+    // A label that many entities carry ("LINE", "COMPCURV") is no name.
+    if (names[panel.name] > 1) panel.name.clear();
+    labels_.push_back({});
+    panel.metres_per_unit = out_.metres_per_unit;
+    panel.resolution = out_.resolution;
+    panel.source = file_.name + ":" + std::to_string(e.line) + ": entity " + std::to_string(e.type);
+    out_.panels.push_back(std::move(panel));
+  }
+}
+
 void Reader::read() {
   const Global& g = file_.global;
   out_.path = file_.name;
@@ -873,9 +954,13 @@ void Reader::read() {
   std::vector<Job> jobs;
   find_faces(jobs);
   for (const Job& job : jobs) add_panels(job);
+  if (!holds_faces()) read_outlines();
   if (out_.panels.empty() && !first_failure_.empty()) throw InputError(first_failure_);
   finish_names();
   out_.warnings = notes_.list();
+  // Notes of a drawing are read though no record is made anew from them.
+  for (const LedgerEntry& row : out_.ledger)
+    if (row.type == 212 && row.disposition == Disposition::read && --unread[row.type] == 0) unread.erase(row.type);
   for (const auto& [type, count] : unread)
     out_.warnings.push_back("entity " + std::to_string(type) + ": " + std::to_string(count) + " kept, not read");
 }

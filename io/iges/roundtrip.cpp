@@ -76,18 +76,30 @@ std::string rewritten(const Global& global, const Delimiters& delimiters) {
   return out.finish();
 }
 
-std::string rewritten(const File& file) {
+// The file from its entries, each record as `record_of` writes it.
+template <class RecordOf>
+std::string with_records(const File& file, const RecordOf& record_of) {
   std::vector<OutRecord> records;
   for (const Entry& e : file.entries) {
     OutRecord record;
     for (std::size_t k = 0; k < 2; ++k) record.cards[k] = padded(e.cards[k], 72);
     std::replace(record.cards[0].begin() + 64, record.cards[0].end(), ' ', '0');
-    record.lines = rewritten(file, e);
+    record.lines = record_of(e);
     records.push_back(std::move(record));
   }
   std::vector<std::string> start;
   for (std::string_view line : file.start) start.push_back(padded(line, 72));
   return assemble(start, rewritten(file.global, file.delimiters), records);
+}
+
+std::string with_surface(const File& file, const Entry& e, const SurfaceChange& change) {
+  Parameters in(file, e);
+  SplineSurface spline = read_spline_surface(in);
+  spline.surface = change(spline.surface);
+  Record record(e.type, file.delimiters);
+  write(spline, record);
+  for (int i = in.position(); i < in.size(); ++i) record.token(in.token(i));
+  return record.finish();
 }
 
 bool same_bits(double a, double b) {
@@ -132,13 +144,30 @@ std::string curve_difference(const TrimmedSurface& a, const TrimmedSurface& b) {
 }  // namespace iges
 
 std::string format_iges(const PanelFile& file, IgesMode mode) {
-  if (file.file) return mode == IgesMode::replay ? file.file->text : iges::rewritten(*file.file);
+  if (file.file) {
+    if (mode == IgesMode::replay) return file.file->text;
+    return iges::with_records(*file.file, [&](const iges::Entry& e) { return iges::rewritten(*file.file, e); });
+  }
   std::vector<OutputFace> faces;
   for (const TrimmedSurface& panel : file.panels) faces.push_back({panel, panel.name, 0, {}});
   IgesHeader header;
   if (!file.unit.empty()) header.unit = file.unit;
   header.resolution = file.resolution;
   return format_iges(faces, header).text;
+}
+
+std::string format_iges(const PanelFile& file, const SurfaceChange& change) {
+  const iges::File& records = *file.file;
+  return iges::with_records(records, [&](const iges::Entry& e) {
+    const bool bad =
+        file.ledger[static_cast<std::size_t>((e.sequence - 1) / 2)].disposition == Disposition::quarantined;
+    if (e.type != 128 || bad) return iges::replayed(records, e);
+    try {
+      return iges::with_surface(records, e, change);
+    } catch (const InputError&) {
+      return iges::replayed(records, e);  // no reader could take it
+    }
+  });
 }
 
 bool RoundtripReport::exact() const {

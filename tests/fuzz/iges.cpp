@@ -1,5 +1,5 @@
 // Any bytes give panels or an InputError; what gives panels comes back exactly when its records are written anew.
-// fuzz_iges -timeout=1 FINDINGS tests/corpus/iges tests/corpus/iges/broken
+// tests/fuzz/run iges SECONDS
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>

@@ -170,7 +170,7 @@ std::size_t count(const std::string& text, const std::string& part) {
 
 TEST(Inspect, TheTableAddressesCurvesAndListsPoints) {
   const Inspection inspection = inspect(flat_panel(true));
-  const std::string text = inspect_text(inspection);
+  const std::string text = inspect_text(inspection, true);
   for (const char* words : {"panel 'front'", "curve:0,0", "curve:0,3", "curve:1,1", "crossing_u", "crossing_v"}) {
     EXPECT_NE(text.find(words), std::string::npos) << words;
   }

@@ -72,7 +72,7 @@ TEST(Scene, ComesOutInSi) {
   const Scene scene = parse(valid_lines());
   ASSERT_EQ(scene.panels.size(), 1u);
   const ScenePanel& panel = scene.panels[0];
-  expect_near_rel(panel.grain, std::numbers::pi / 6, 1e-15);
+  expect_near_rel(panel.grain.value(), std::numbers::pi / 6, 1e-15);
   expect_near_rel(panel.fabric.density, 0.15, 1e-15);
   expect_near_rel(panel.span.value(), 0.02, 1e-15);
   EXPECT_EQ(panel.fabric.bending.kappa_reg, 0.03);
@@ -123,6 +123,29 @@ TEST(Scene, MissingKeysAndFilesAreNamed) {
   }
 }
 
+TEST(Scene, SeamsAndObstaclesAreReadAndChecked) {
+  expect_message(3, "pattern = \"a.json\"", {"pattern", "a.json", "does not exist"});
+  const auto top = [](const std::string& tables) { return tables + "\n[[panel]]"; };
+  expect_message(1, top("seam = [{}]"), {"[[seam]] needs a"});
+  expect_message(1, top("seam = [{ a = { panel = \"cloth\" } }]"), {"a of [[seam]] needs curve"});
+  expect_message(1, top("seam = [{ a = { curve = 1, revers = true } }]"), {"unknown key 'revers'", "reverse"});
+  expect_message(1, top("seam = [{ a = { panel = \"clothh\", curve = 1 } }]"), {"no panel is called 'clothh'"});
+  expect_message(1, top("seam = [{ a = { curve = 1 }, b = { loop = 0, curve = 1 } }]"), {"with itself"});
+  expect_message(1, top("obstacle = [{}]"), {"[[obstacle]] needs mesh"});
+  expect_message(1, top("obstacle = [{ mesh = \"nobody.obj\" }]"), {"nobody.obj", "does not exist"});
+  expect_message(1, top("obstacle = [{ mesh = \"scene.toml\", unit = \"kg\" }]"), {"must be a length unit"});
+  std::vector<std::string> lines = valid_lines();
+  lines[0] =
+      top("seam = [{ a = { curve = 1 }, b = { loop = 1, curve = 2, reverse = true } }]\n"
+          "obstacle = [{ mesh = \"scene.toml\", unit = \"cm\", thickness = \"1 mm\" }]");
+  const Scene scene = parse(lines);
+  ASSERT_EQ(scene.seams.size(), 1u);
+  EXPECT_EQ(scene.seams[0].a.panel, "cloth");
+  EXPECT_TRUE(scene.seams[0].b.reverse);
+  ASSERT_EQ(scene.obstacles.size(), 1u);
+  EXPECT_EQ(scene.obstacles[0].metres_per_unit, 0.01);
+}
+
 TEST(Scene, ABandNamesWhatItNeeds) {
   EXPECT_NE(refusal(11, "mode = \"band\"").find("stretch = [weft, warp]"), std::string::npos);
   EXPECT_EQ(refusal(11, "mode = \"band\"\nstretch = [0.05, 0.02]"), "accepted");
@@ -136,10 +159,7 @@ TEST(Scene, LaterFeaturesAreRefusedByName) {
   expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});
   expect_message(15, "scheme = \"newmark\"", {"not supported by this version", "verlet"});
   expect_message(15, "until = \"rest\"", {"not supported by this version"});
-  expect_message(12, "[[seam]]", {"[[seam]] is not supported by this version"});
-  expect_message(12, "[[obstacle]]", {"[[obstacle]] is not supported by this version"});
   expect_message(12, "[[contact_pair]]", {"[[contact_pair]] is not supported by this version"});
-  expect_message(3, "pattern = \"a.json\"", {"pattern files are not supported by this version"});
 }
 
 TEST(Scene, BrokenTomlNamesItsLine) {
@@ -150,7 +170,7 @@ TEST(Scene, SettingsOverrideAndAdd) {
   const Scene scene = parse(
       valid_lines(), {"panel.0.grain_deg=45", "strain_limit.mode=off", "fabric.linen.density=200 g/m2",
                       "load.gravity=[0, 0, -1.62]", "pin.1.at=corner:1,0", "panel[0].refine={control_points=[5,6]}"});
-  expect_near_rel(scene.panels[0].grain, std::numbers::pi / 4, 1e-15);
+  expect_near_rel(scene.panels[0].grain.value(), std::numbers::pi / 4, 1e-15);
   EXPECT_FALSE(scene.strain_limit.on);
   expect_near_rel(scene.panels[0].fabric.density, 0.2, 1e-15);
   EXPECT_EQ(scene.gravity.z(), -1.62);

@@ -1,0 +1,26 @@
+#include "pipeline/drawing_plane.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <cmath>
+
+namespace toile {
+
+using Eigen::Vector3d;
+
+std::optional<DrawingPlane> drawing_plane(const NurbsSurface& surface) {
+  const Vector3d centre = surface.points().rowwise().mean();
+  const Eigen::Matrix3Xd spread = surface.points().colwise() - centre;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread * spread.transpose());
+  Vector3d normal = axes.eigenvectors().col(0);
+  const double size = spread.colwise().norm().maxCoeff();
+  if (!((normal.transpose() * spread).cwiseAbs().maxCoeff() <= 1e-6 * size)) return std::nullopt;
+  const Interval u = surface.u().domain(), v = surface.v().domain();
+  const SurfaceJet jet = evaluate(surface, (u.min + u.max) / 2, (v.min + v.max) / 2);
+  if (jet.u.cross(jet.v).dot(normal) < 0) normal = -normal;
+  Vector3d right = std::abs(normal.z()) > 0.9999 ? Vector3d(normal.z() > 0 ? 1 : -1, 0, 0) : Vector3d(jet.u);
+  right = (right - right.dot(normal) * normal).normalized();
+  return DrawingPlane{right, normal.cross(right)};
+}
+
+}  // namespace toile

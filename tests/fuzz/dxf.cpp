@@ -1,0 +1,16 @@
+// Any bytes as a DXF drawing: panels or an InputError, nothing else.
+#include "io/dxf.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "geometry/error.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    toile::parse_dxf({reinterpret_cast<const char*>(data), size}, "fuzz.dxf");
+  } catch (const toile::InputError&) {
+  }
+  return 0;
+}

@@ -1,0 +1,15 @@
+// Any bytes as a sewing pattern: panels or an InputError, nothing else.
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "geometry/error.h"
+#include "io/pattern_json.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    toile::parse_pattern({reinterpret_cast<const char*>(data), size}, "fuzz.json");
+  } catch (const toile::InputError&) {
+  }
+  return 0;
+}

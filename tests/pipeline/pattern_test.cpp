@@ -1,0 +1,227 @@
+// From a pattern file to a scene, to other files and to paper.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+
+#include "geometry/error.h"
+#include "io/panel_file.h"
+#include "pipeline/build.h"
+#include "pipeline/convert.h"
+#include "pipeline/panels.h"
+#include "pipeline/pattern_scene.h"
+#include "pipeline/scene.h"
+#include "support/near.h"
+
+namespace toile {
+namespace {
+
+using test::Folder;
+const std::filesystem::path corpus = TOILE_TEST_DATA;
+
+std::string skirt_text() {
+  return read_file(corpus / "patterns/skirt.jsonc");
+}
+
+std::string replaced(std::string text, const std::string& old, const std::string& replacement) {
+  return text.replace(text.find(old), old.size(), replacement);
+}
+
+// A box of 0.3 m x 1.666 m x 0.2 m with its soles at y = -1.
+void write_box(const std::filesystem::path& file) {
+  std::string text;
+  for (const char* y : {"-1", "0.666"})
+    for (const char* xz : {"-0.15 {} -0.1", "0.15 {} -0.1", "0.15 {} 0.1", "-0.15 {} 0.1"})
+      text += "v " + replaced(xz, "{}", y) + "\n";
+  text += "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n";
+  write_file(file, text);
+}
+
+int run(const Folder& folder, const std::string& arguments) {
+  const int status = std::system(
+      ("cd '" + folder.path().string() + "' && '" TOILE_PROGRAM "' " + arguments + " >stdout.txt 2>stderr.txt")
+          .c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(PatternScene, SeamsRunSoThatPlacedEndsMeet) {
+  const Pattern skirt = parse_pattern(skirt_text(), "skirt.jsonc");
+  for (const Stitch& stitch : skirt.stitches) {
+    EXPECT_TRUE(seam_direction(skirt, stitch).reverse);
+    EXPECT_FALSE(seam_direction(skirt, stitch).doubt);
+  }
+  // The back turned about y: its other side, which runs downwards as well, now lies at the front's edge 1.
+  std::string text = replaced(skirt_text(), "\"translation\": [0, 0, -60], \"rotation\": [0, 0, 0]",
+                              "\"translation\": [0, 0, -60], \"rotation\": [0, 180, 0]");
+  text = replaced(text, "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 3}",
+                  "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 1}");
+  const Pattern turned = parse_pattern(text, "turned.jsonc");
+  EXPECT_FALSE(seam_direction(turned, turned.stitches[0]).reverse);
+  EXPECT_FALSE(seam_direction(turned, turned.stitches[0]).doubt);
+  // A waist to a hem that lies across: neither way is nearer.
+  text = replaced(skirt_text(), "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 3}",
+                  "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 2}");
+  text = replaced(text, "[0, 0, -60], \"rotation\": [0, 0, 0]", "[0, 900, -60], \"rotation\": [90, 90, 0]");
+  const Pattern across = parse_pattern(text, "across.jsonc");
+  EXPECT_TRUE(seam_direction(across, across.stitches[0]).doubt);
+}
+
+TEST(PatternScene, TheSceneIsCompleteAndValid) {
+  const Folder folder("pattern_scene");
+  write_file(folder / "skirt.jsonc", skirt_text());
+  write_box(folder / "body.obj");
+  const PatternScene written = pattern_scene(folder / "skirt.jsonc", folder / "body.obj", folder / "scene.toml");
+  const Scene scene = parse_scene(written.text, folder / "scene.toml");
+  ASSERT_EQ(scene.panels.size(), 2u);
+  EXPECT_EQ(scene.panels[0].name, "front");
+  EXPECT_EQ(scene.panels[0].file, folder / "skirt.jsonc");
+  ASSERT_EQ(scene.seams.size(), 2u);
+  EXPECT_TRUE(scene.seams[0].b.reverse);
+  ASSERT_EQ(scene.obstacles.size(), 1u);
+  EXPECT_EQ(scene.obstacles[0].mesh, folder / "body.obj");
+  EXPECT_EQ(scene.gravity, Eigen::Vector3d(0, -9.81, 0));
+  // The origin of this dialect goes to 1.04 m of 1.666 m above the soles: y = -1 + 1.04.
+  expect_near_rel(scene.panels[0].place.translate.y(), 0.04, 1e-12, 1e-12);
+  expect_near_rel(scene.panels[0].place.translate.z(), 0.2, 1e-12);
+  // Each panel hangs by its waist: curve 0 of both.
+  ASSERT_EQ(scene.pins.size(), 2u);
+  for (const ScenePin& pin : scene.pins) EXPECT_EQ(pin.at.text, "curve:0,0");
+  // The box is 2 (0.3 + 0.2) m around.
+  EXPECT_NE(written.text.find("the body measures 1.000 m there"), std::string::npos) << written.text;
+  EXPECT_NO_THROW(build(scene));
+}
+
+TEST(PatternScene, DrapeSaysWhatItLeavesOut) {
+  const Folder folder("pattern_drape");
+  write_file(folder / "skirt.jsonc", skirt_text());
+  write_box(folder / "body.obj");
+  ASSERT_EQ(run(folder, "init --pattern skirt.jsonc --body body.obj -o scene.toml"), 0)
+      << read_file(folder / "stderr.txt");
+  EXPECT_EQ(run(folder, "init --pattern skirt.jsonc -o scene.toml"), 8) << "it overwrites nothing";
+  const std::string coarse = " --set 'panel.0.refine={spans=[3,3]}' --set 'panel.1.refine={spans=[3,3]}'";
+  EXPECT_EQ(run(folder, "check scene.toml" + coarse), 0) << read_file(folder / "stderr.txt");
+  EXPECT_NE(read_file(folder / "stderr.txt").find("seams are not simulated"), std::string::npos);
+  EXPECT_EQ(run(folder, "drape scene.toml -o out" + coarse), 3);
+  const std::string refusal = read_file(folder / "stderr.txt");
+  EXPECT_NE(refusal.find("error: scene.toml:"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("--set 'seam=[]'"), std::string::npos) << refusal;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  EXPECT_EQ(run(folder,
+                "drape scene.toml -o out --until 0.02 --set 'seam=[]' --set 'obstacle=[]' --set output.preview=false" +
+                    coarse),
+            0)
+      << read_file(folder / "stderr.txt");
+  EXPECT_EQ(run(folder, "check scene.toml --set seam.0.a.curve=17"), 4);
+  EXPECT_NE(read_file(folder / "stderr.txt").find("panel 'front' has no curve 0,17"), std::string::npos);
+}
+
+TEST(PatternScene, APanelsGrainLineTurnsItsFabric) {
+  const Folder folder("grain");
+  std::filesystem::copy_file(corpus / "iges/outlines_only.igs", folder / "panel.igs");
+  const std::string text = "[[panel]]\nname = \"FRONT\"\nfile = \"panel.igs\"\nrefine = { spans = [2, 2] }\n";
+  const std::string pin = "[[pin]]\nat = \"curve:0,0\"\n";
+  const auto grain = [&](const std::string& more) {
+    return build(parse_scene(text + more + pin, folder / "scene.toml")).model->panels()[0].grain;
+  };
+  expect_near_rel(grain(""), -std::atan2(50, 200), 1e-14);
+  expect_near_rel(grain("grain_deg = 45\n"), std::numbers::pi / 4, 1e-15);
+}
+
+TEST(Convert, PatternsBecomeIgesWithTheSameNumbers) {
+  const Folder folder("convert");
+  write_file(folder / "skirt.jsonc", skirt_text());
+  ASSERT_EQ(run(folder, "convert skirt.jsonc panels.igs"), 0) << read_file(folder / "stderr.txt");
+  const PanelFile source = read_panels(folder / "skirt.jsonc"), panels = read_panels(folder / "panels.igs");
+  ASSERT_EQ(panels.panels.size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_EQ(panels.panels[k].name, source.panels[k].name);
+    EXPECT_EQ(panels.panels[k].surface, source.panels[k].surface);
+    for (std::size_t c = 0; c < source.panels[k].loops[0].curves.size(); ++c)
+      EXPECT_EQ(panels.panels[k].loops[0].curves[c].curve, source.panels[k].loops[0].curves[c].curve);
+  }
+  ASSERT_EQ(run(folder, "convert skirt.jsonc fine.igs --degree 3 --span '50 mm'"), 0);
+  const NurbsSurface fine = read_panels(folder / "fine.igs").panels[0].surface;
+  EXPECT_EQ(fine.u().degree(), 3);
+  // 240 and 195 units of 1/300 m: 0.8 m and 0.65 m; the hem's control point lies 30 units below.
+  EXPECT_EQ(fine.u().spans().size(), 16u);
+  EXPECT_EQ(run(folder, "roundtrip fine.igs"), 0);
+}
+
+TEST(Convert, IgesKeepsEveryRecordButRefinedSurfaces) {
+  const Folder folder("replay");
+  const auto source = corpus / "iges/hole_and_composite.igs";
+  std::filesystem::copy_file(source, folder / "in.igs");
+  ASSERT_EQ(run(folder, "convert in.igs out.igs"), 0);
+  EXPECT_EQ(read_file(folder / "out.igs"), read_file(source));
+  ASSERT_EQ(run(folder, "convert in.igs fine.igs --spans 5"), 0) << read_file(folder / "stderr.txt");
+  const PanelFile before = read_panels(source), after = read_panels(folder / "fine.igs");
+  EXPECT_EQ(after.entities, before.entities);
+  EXPECT_EQ(after.unit, before.unit);
+  EXPECT_EQ(after.panels[0].surface.u().spans().size(), 5u);
+  for (std::size_t l = 0; l < before.panels[0].loops.size(); ++l)
+    for (std::size_t c = 0; c < before.panels[0].loops[l].curves.size(); ++c)
+      EXPECT_EQ(after.panels[0].loops[l].curves[c].curve, before.panels[0].loops[l].curves[c].curve);
+  EXPECT_EQ(run(folder, "convert in.igs in.igs"), 8) << "the input is kept";
+}
+
+TEST(Convert, EveryEndingWritesItsFormat) {
+  const Folder folder("formats");
+  write_file(folder / "bodice.json", read_file(corpus / "patterns/bodice_and_cuff.json"));
+  for (const char* ending : {"igs", "svg", "obj", "ply", "stl", "glb", "vtu", "IGES"}) {
+    EXPECT_EQ(run(folder, std::string("convert bodice.json out.") + ending), 0)
+        << ending << read_file(folder / "stderr.txt");
+    EXPECT_TRUE(std::filesystem::exists(folder / (std::string("out.") + ending)));
+  }
+  EXPECT_EQ(run(folder, "convert bodice.json out.step"), 3);
+  EXPECT_NE(read_file(folder / "stderr.txt").find("can't write '.step' files"), std::string::npos);
+  EXPECT_EQ(run(folder, "convert nowhere.json out.igs"), 3);
+  write_file(folder / "broken.json", "{\"pattern\": [\n");
+  EXPECT_EQ(run(folder, "convert broken.json broken.igs"), 3);
+  EXPECT_FALSE(std::filesystem::exists(folder / "broken.igs"));
+  EXPECT_NE(read_file(folder / "stderr.txt").find("broken.json:1: no valid JSON"), std::string::npos);
+}
+
+TEST(Convert, ThePrintIsMillimetres) {
+  const std::string svg = print_svg(parse_pattern(skirt_text(), "skirt.jsonc").file);
+  // Two panels of 800 mm in two rows, with margins of 20 mm.
+  EXPECT_NE(svg.find("width=\"840mm\""), std::string::npos) << svg.substr(0, 200);
+  EXPECT_NE(svg.find("viewBox=\"0 0 840 "), std::string::npos);
+  EXPECT_NE(svg.find("100 mm"), std::string::npos);
+  // The front's waist is one quadratic from (60, 0) to (-60, 0) by way of (0, -30), 10/3 mm a unit.
+  EXPECT_NE(svg.find("Q420 132 220 32"), std::string::npos) << svg;
+  TrimmedSurface bent = parse_pattern(skirt_text(), "skirt.jsonc").file.panels[0];
+  Eigen::Matrix3Xd points = bent.surface.points();
+  points(2, 4) += 50;
+  bent.surface = bent.surface.with_points(points);
+  PanelFile file;
+  file.panels = {bent};
+  EXPECT_THROW(print_svg(file), GeometryError);
+}
+
+TEST(Inspect, DrawingsOfAPatternAreWhole) {
+  const Folder folder("looking");
+  std::filesystem::copy_file(corpus / "iges/outlines_only.igs", folder / "panel.igs");
+  ASSERT_EQ(run(folder, "inspect panel.igs --svg a.svg --html a.html --spans 4"), 0)
+      << read_file(folder / "stderr.txt");
+  const std::string page = read_file(folder / "a.html"), text = read_file(folder / "stdout.txt");
+  EXPECT_NE(page.find("<svg "), std::string::npos);
+  EXPECT_EQ(page.find("http://"), page.find("http://www.w3.org/2000/svg")) << "nothing is loaded from elsewhere";
+  EXPECT_NE(page.find("FRONT"), std::string::npos);
+  EXPECT_NE(page.find("grain line"), std::string::npos) << "warnings are on the page";
+  std::size_t widest = 0, at = 0;
+  for (std::size_t end; (end = text.find('\n', at)) != std::string::npos; at = end + 1) {
+    const std::string line = text.substr(at, end - at);  // warnings and reasons are as long as they are
+    if (!line.starts_with("  warning") && line.find("line ") == std::string::npos)
+      widest = std::max(widest, line.size());
+  }
+  EXPECT_LE(widest, 110u) << text;
+  if (run(folder, "inspect panel.igs --png a.png") == 8) GTEST_SKIP() << "built without stb";
+  const std::string picture = read_file(folder / "a.png");
+  EXPECT_EQ(picture.substr(1, 3), "PNG");
+}
+
+}  // namespace
+}  // namespace toile
