@@ -242,18 +242,6 @@ TEST(Program, AnUnmetLimitIsExit6) {
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "check");
 }
 
-TEST(Program, AnInterruptLeavesWholeFiles) {
-  const Small folder("interrupt");
-  const std::string command = "cd '" + folder.path().string() +
-                              "' && timeout --preserve-status -s INT 1 '" TOILE_PROGRAM
-                              "' drape scene.toml -o result --until 100000 --set output.every=1 2>stderr.txt";
-  const int status = std::system(command.c_str());
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 130) << read_file(folder / "stderr.txt");
-  EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "interrupted");
-  EXPECT_EQ(toile(folder, "roundtrip result/draped.igs").code, 0);
-}
-
 // Long enough to be stopped on the way, with frames of every format.
 const std::string long_run =
     "drape scene.toml --set 'output.formats=[\"vtu\", \"obj\", \"iges\"]' --set output.every=0.25 --until 2";
