@@ -16,10 +16,13 @@ namespace {
 // Below this many rows the envelope factor below is faster than CHOLMOD (README, "Constraints").
 constexpr int envelope_rows = 1000;
 
+// One thread in BLAS and none of OpenMP's in CHOLMOD, which asks for four in each factorisation and waits for them longer than
+// it computes.
 void single_blas_thread() {
   using Setter = void (*)(int);
   static const bool done = [] {
     if (auto* set = reinterpret_cast<Setter>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"))) set(1);
+    if (auto* set = reinterpret_cast<Setter>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"))) set(0);
     return true;
   }();
   (void)done;
