@@ -16,9 +16,10 @@ class AffineMap {
   using Matrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
   // `dependence`: n_q x n_q; row i says how control point i follows the others: identity rows are independent; the rows
-  // of extended functions and of control points that carry no cloth hold extension coefficients and refer to independent
-  // control points only. `fixed`: control points held or moved, none twice; motion(i, t) is the place of the i-th of
-  // them [m]. A fixed control point's own dependence row is ignored. Throws SolverError where this doesn't hold.
+  // of extended functions and of control points that carry no cloth hold extension coefficients and refer to
+  // independent control points only. `fixed`: control points held or moved, none twice; motion(i, t) is the place of
+  // the i-th of them [m]. A fixed control point's own dependence row is ignored. Throws SolverError where this doesn't
+  // hold.
   using Motion = std::function<Eigen::Vector3d(std::size_t, double)>;
   AffineMap(const Matrix& dependence, std::vector<int> fixed, Motion motion);
 

@@ -1,7 +1,6 @@
 #include "analysis/extension.h"
 
 #include <Eigen/Geometry>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -102,11 +101,11 @@ class Extender {
   std::vector<int> leader_;
   std::vector<std::vector<int>> members_;  // of each leader, itself first
   Eigen::VectorXd mass_;                   // of leaders, their members' together
-  std::vector<double> area_;     // of material per cell
-  std::vector<double> support_;  // part of each leader's support in the material
-  std::vector<Role> role_;       // members have their leader's
-  std::vector<char> host_;       // cells all of whose functions stand on their own
-  std::vector<Row> rows_;        // of extended and bare leaders, over leaders
+  std::vector<double> area_;               // of material per cell
+  std::vector<double> support_;            // part of each leader's support in the material
+  std::vector<Role> role_;                 // members have their leader's
+  std::vector<char> host_;                 // cells all of whose functions stand on their own
+  std::vector<Row> rows_;                  // of extended and bare leaders, over leaders
 };
 
 void Extender::weigh() {
@@ -127,9 +126,7 @@ void Extender::weigh() {
   for (int i = 0; i < size(); ++i) {
     const int k = leader_[i];
     support_[i] = whole[k] > 0 ? material[k] / whole[k] : 0;
-    role_[i] = material[k] <= 0                          ? Role::bare
-               : support_[i] < options_.smallest_support ? Role::extended
-                                                         : Role::own;
+    role_[i] = material[k] <= 0 ? Role::bare : support_[i] < options_.smallest_support ? Role::extended : Role::own;
   }
 }
 
@@ -197,9 +194,9 @@ Row Extender::tangent_row(int control_point, Host host) const {
   Row row;
   for (int b = 0; b <= bv.degree; ++b)
     for (int a = 0; a <= bu.degree; ++a)
-      row.push_back({leader_[rest_.index(bu.first + a, bv.first + b)],
-                     bu.value[0][a] * bv.value[0][b] + du * bu.value[1][a] * bv.value[0][b] +
-                         dv * bu.value[0][a] * bv.value[1][b]});
+      row.push_back({leader_[rest_.index(bu.first + a, bv.first + b)], bu.value[0][a] * bv.value[0][b] +
+                                                                           du * bu.value[1][a] * bv.value[0][b] +
+                                                                           dv * bu.value[0][a] * bv.value[1][b]});
   return row;
 }
 
@@ -381,8 +378,7 @@ Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density, double frac
         return std::clamp(g, line.breaks.front(), line.breaks.back());
       };
       const SurfaceJet s = evaluate(rest, inside(u, rest.u().greville(i)), inside(v, rest.v().greville(j)));
-      floor[rest.index(i, j)] =
-          fraction * density * s.u.cross(s.v).norm() * mean_span(u, i) * mean_span(v, j);
+      floor[rest.index(i, j)] = fraction * density * s.u.cross(s.v).norm() * mean_span(u, i) * mean_span(v, j);
     }
   return floor;
 }

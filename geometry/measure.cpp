@@ -81,8 +81,8 @@ template Eigen::AlignedBox<double, 2> bounding_box(const NurbsCurve<2>&);
 template Eigen::AlignedBox<double, 3> bounding_box(const NurbsCurve<3>&);
 
 std::optional<Eigen::Vector3d> mean_u_direction(const NurbsSurface& surface, double flatness) {
-  constexpr int lines = 32;              // of constant v, whose chords are averaged
-  constexpr double least_chord = 0.05;   // of the lines' length
+  constexpr int lines = 32;             // of constant v, whose chords are averaged
+  constexpr double least_chord = 0.05;  // of the lines' length
   const Eigen::Matrix3Xd spread = surface.points().colwise() - surface.points().rowwise().mean();
   const Eigen::Vector3d normal =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread * spread.transpose()).eigenvectors().col(0);

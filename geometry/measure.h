@@ -17,9 +17,9 @@ Eigen::AlignedBox3d bounding_box(const NurbsSurface& surface);
 // Area of the whole (untrimmed) surface over its domain.
 double surface_area(const NurbsSurface& surface, double relative_tolerance = 1e-10);
 
-// Unit mean of d x / du over a flat surface: straight threads of a cloth cut from it run at one angle to it, however the
-// net is skewed. Depends on the geometry alone, not on its knots. Nothing where the net leaves its plane by more than
-// `flatness` of its size, or where the mean points nowhere (u runs around a ring).
+// Unit mean of d x / du over a flat surface: straight threads of a cloth cut from it run at one angle to it, however
+// the net is skewed. Depends on the geometry alone, not on its knots. Nothing where the net leaves its plane by more
+// than `flatness` of its size, or where the mean points nowhere (u runs around a ring).
 std::optional<Eigen::Vector3d> mean_u_direction(const NurbsSurface& surface, double flatness = 1e-9);
 
 // The point of the surface nearest to `target`. `residual` is the length of the part of x - target that lies in those

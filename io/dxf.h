@@ -10,7 +10,8 @@
 namespace toile {
 
 // A block is a piece; entities outside of blocks are one more. By layer: 1 boundary, 2 turn points, 4 and 80 to 83
-// notches, 7 grain line, 8 internal lines, 11 internal cutouts, 13 drill holes; texts "Piece Name: ", "Size: ", "Units: ".
+// notches, 7 grain line, 8 internal lines, 11 internal cutouts, 13 drill holes; texts "Piece Name: ", "Size: ", "Units:
+// ".
 //   (1) closed boundaries are panels, cutouts and inner boundaries their holes; numbers stay the file's, its unit is
 //       millimetres (METRIC) or inches (ENGLISH);
 //   (2) polylines are polylines, split into curves at the turn points, where there are none at corners of more than 20

@@ -16,29 +16,31 @@
 
 namespace toile {
 
-namespace iges { struct File; }  // sections, directory entries and parameter records as read (io/iges/file.h)
+namespace iges {
+struct File;
+}  // namespace iges
 
 enum class Disposition { read, converted, kept, quarantined };
 
 // What happened to an entity of the file.
 struct LedgerEntry {
-  int sequence = 0;       // number of its directory entry (odd, as the file counts)
-  int line = 0;           // line of the file where the directory entry stands
+  int sequence = 0;  // number of its directory entry (odd, as the file counts)
+  int line = 0;      // line of the file where the directory entry stands
   int type = 0, form = 0;
   Disposition disposition = Disposition::kept;
-  std::string why;        // for converted and quarantined
+  std::string why;  // for converted and quarantined
 };
 
 struct PanelFile {
   std::string path;
-  std::string unit;                 // "MM", "INCH", ... as the file names it
+  std::string unit;  // "MM", "INCH", ... as the file names it
   double metres_per_unit = 1;
-  double resolution = 0;            // global field 19, unit of the file
-  std::string exporter;             // global fields 3 and 5 to 6
-  std::map<int, int> entities;      // type -> count
+  double resolution = 0;               // global field 19, unit of the file
+  std::string exporter;                // global fields 3 and 5 to 6
+  std::map<int, int> entities;         // type -> count
   std::vector<TrimmedSurface> panels;  // every face (144) and every free-standing 128, in file order
   std::vector<LedgerEntry> ledger;
-  std::vector<std::string> warnings;   // one per kind of oddity, with line and entity
+  std::vector<std::string> warnings;       // one per kind of oddity, with line and entity
   std::shared_ptr<const iges::File> file;  // the records, for replay
 };
 
@@ -50,23 +52,23 @@ PanelFile parse_iges(std::string_view text, const std::string& name);
 enum class IgesMode { replay, rewrite };
 std::string format_iges(const PanelFile& file, IgesMode mode = IgesMode::replay);
 
-// The records that were read, each B-spline surface (128) replaced by what `change` makes of it; the geometry must stay,
-// for boundaries and model curves are replayed with all the rest. `file` must have its records.
+// The records that were read, each B-spline surface (128) replaced by what `change` makes of it; the geometry must
+// stay, for boundaries and model curves are replayed with all the rest. `file` must have its records.
 using SurfaceChange = std::function<NurbsSurface(const NurbsSurface&)>;
 std::string format_iges(const PanelFile& file, const SurfaceChange& change);
 
 // A face for a new file: net and trims in `face`'s unit; faces of one file share it.
 struct OutputFace {
   TrimmedSurface face;
-  std::string name;                                   // 406 form 15
+  std::string name;  // 406 form 15
   int level = 0;
-  std::optional<std::array<double, 3>> colour;        // rgb, 0..1 (314)
+  std::optional<std::array<double, 3>> colour;  // rgb, 0..1 (314)
 };
 struct IgesHeader {
   std::string product = "toile";
-  std::string unit = "MM";             // IGES unit name that agrees with the faces' metres_per_unit
-  double resolution = 1e-6;            // unit of the file; raised to the fit error of the model curves where that is larger
-  std::optional<std::string> date;     // YYYYMMDD.HHNNSS; unset: SOURCE_DATE_EPOCH, else 19700101.000000
+  std::string unit = "MM";   // IGES unit name that agrees with the faces' metres_per_unit
+  double resolution = 1e-6;  // unit of the file; raised to the fit error of the model curves where that is larger
+  std::optional<std::string> date;  // YYYYMMDD.HHNNSS; unset: SOURCE_DATE_EPOCH, else 19700101.000000
 };
 struct IgesOutput {
   std::string text;

@@ -15,7 +15,7 @@ struct JsonValue {
   int line = 0;       // where the value begins
   double number = 0;  // 0 or 1 for a boolean
   std::string text;
-  std::vector<JsonValue> items;                            // of an array
+  std::vector<JsonValue> items;     // of an array
   std::vector<JsonMember> members;  // of an object, in the file's order
 
   const JsonValue* find(std::string_view key) const;  // null where this is no object or has no such key

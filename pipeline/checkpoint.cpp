@@ -53,7 +53,8 @@ void fields(auto& archive, Like<TimeStepBound> auto& b) {
   archive(b.dt, b.eigenvalue, b.relative_gap, b.cell, b.bending);
 }
 void fields(auto& archive, Like<EnergyBalance> auto& e) {
-  archive(e.kinetic, e.membrane, e.bending, e.limit, e.start, e.load_work, e.drag_work, e.motion_work, e.gravity, e.injected);
+  archive(e.kinetic, e.membrane, e.bending, e.limit, e.start, e.load_work, e.drag_work, e.motion_work, e.gravity,
+          e.injected);
 }
 void fields(auto& archive, Like<ProjectionReport> auto& r) {
   archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);

@@ -121,9 +121,9 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["stress"]["part"] =
       system.strain_rows > 0 ? "membrane only: what the strain limit carries is not in it" : "whole";
   const EnergyBalance& e = run.energy;
-  report["energy"] = {{"kinetic", e.kinetic},         {"membrane", e.membrane},       {"bending", e.bending}, {"limit", e.limit},
-                      {"gravity", e.gravity},         {"dissipated", e.dissipated()}, {"loads_work", e.load_work},
-                      {"motion_work", e.motion_work}, {"injected", e.injected}};
+  report["energy"] = {{"kinetic", e.kinetic},      {"membrane", e.membrane},       {"bending", e.bending},
+                      {"limit", e.limit},          {"gravity", e.gravity},         {"dissipated", e.dissipated()},
+                      {"loads_work", e.load_work}, {"motion_work", e.motion_work}, {"injected", e.injected}};
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
                           {"iterations_max", run.iterations_max},
                           {"unconverged_steps", run.unconverged_steps}};

@@ -18,9 +18,10 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-constexpr double step_safety = 0.9;                   // of the eigenvalue bound
-constexpr int steps_per_bound = 100;                  // the bound costs some 40 forces
-// A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the plan.
+constexpr double step_safety = 0.9;   // of the eigenvalue bound
+constexpr int steps_per_bound = 100;  // the bound costs some 40 forces
+// A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the
+// plan.
 constexpr double damped_scale = 0.8, smallest_damped = 0.25;
 constexpr double smallest_scale = 1.0 / 1024;         // ten halvings of the planned step
 constexpr double step_rise = 0.05, total_rise = 0.2;  // of the energy turned over
@@ -120,8 +121,7 @@ class Loop {
   }
 
   TimeStepBound bound_of(const System& system) const {
-    return time_step_bound(*build_.model, *system.map, system.dynamic.node_mass,
-                           control_points(system, result_.state));
+    return time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, control_points(system, result_.state));
   }
   double limit_energy() const {
     const System& system = *result_.system;
@@ -175,7 +175,8 @@ class Loop {
     }
   }
 
-  // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest / dt.
+  // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest /
+  // dt.
   void settle() {
     const System& system = *result_.system;
     if (!system.projection || system.projection->measure(result_.state.x, 0).converged) return;
@@ -191,8 +192,8 @@ class Loop {
     const EnergyBalance& e = result_.energy;
     const double elastic = report.elastic.total() + report.limit_energy;
     const double now = report.kinetic + 0.5 * (e.elastic() + elastic);
-    const double work = e.load_work + e.drag_work + e.motion_work +
-                        0.5 * (report.load_work + report.drag_work + report.motion_work);
+    const double work =
+        e.load_work + e.drag_work + e.motion_work + 0.5 * (report.load_work + report.drag_work + report.motion_work);
     const double balance = now - e.start - work;
     const double turned = std::max({result_.loop.scale, std::abs(e.load_work + report.load_work),
                                     std::abs(e.motion_work + report.motion_work), std::abs(e.drag_work), e.now()});

@@ -49,9 +49,9 @@ struct LoopState {
   double done = -1;      // s, last frame or release time that is dealt with; none at first
   double dt_scale = 1;   // of the planned step
   int steps_since_bound = 0;
-  double scale = 0, balance = 0;           // J, energy turned over; unexplained rise
-  double rounding = 0;                     // J, that nobody sees
-  double kick = 0;                         // J, of the last accepted step: what a smaller step may seem to gain
+  double scale = 0, balance = 0;  // J, energy turned over; unexplained rise
+  double rounding = 0;            // J, that nobody sees
+  double kick = 0;                // J, of the last accepted step: what a smaller step may seem to gain
 };
 
 // Calls of the memory allocator; warming up is among them.
@@ -101,7 +101,8 @@ struct RunHooks {
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
 // state, evaluated anew every 100 steps; where the projection had to damp, less.
 //   (1) every number of an accepted step is finite;
-//   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from step
+//   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from
+//   step
 //       to step by no more than 5 % of the energy turned over so far, and in all by no more than 20 %, far less than an
 //       unstable step soon does.
 //       A step that breaks this is redone with half the step; the planned step is halved ten times at most, then the

@@ -404,8 +404,8 @@ std::string scene_name(const std::filesystem::path& path) {
   return folder.empty() ? stem : folder;
 }
 
-// "mode": inextensible resists from the first strain on and stays within the tolerance; band lets cloth strain freely to
-// 90 % of the limits, each direction and sign its own.
+// "mode": inextensible resists from the first strain on and stays within the tolerance; band lets cloth strain freely
+// to 90 % of the limits, each direction and sign its own.
 void read_limit(Table table, Scene& scene) {
   constexpr double band_slack = 0.9, band_tolerance = 0.01;  // of the limits
   StrainLimit& limit = scene.strain_limit;
@@ -415,19 +415,25 @@ void read_limit(Table table, Scene& scene) {
   table.number(limit.tolerance, "tolerance", dimension::none, Range::positive);
   limit.weft = limit.warp = {limit.tolerance, limit.tolerance};
   if (band) {
-    const auto stretch = table.vector<2>("stretch", dimension::none), compress = table.vector<2>("compress", dimension::none);
-    if (!stretch && !compress) throw InputError(table.where() + ": mode = \"band\" needs stretch = [weft, warp], compress = [weft, warp], or both");
+    const auto stretch = table.vector<2>("stretch", dimension::none),
+               compress = table.vector<2>("compress", dimension::none);
+    if (!stretch && !compress)
+      throw InputError(table.where() +
+                       ": mode = \"band\" needs stretch = [weft, warp], compress = [weft, warp], or both");
     constexpr double free = 0.5;  // C = -1/2 is a thread of no length
     for (int k : {0, 1}) {
       StrainBand& b = k == 0 ? limit.weft : limit.warp;
       b = {stretch ? (*stretch)[k] : 1e3, compress ? (*compress)[k] : free, band_slack};
       if (!(b.stretch > 0 && b.compress > 0))
-        throw InputError(table.where() + ": stretch and compress are strains above 0 in weft and warp, such as [0.05, 0.02]");
+        throw InputError(table.where() +
+                         ": stretch and compress are strains above 0 in weft and warp, such as [0.05, 0.02]");
     }
     if (!table.find("tolerance"))
-      limit.tolerance = band_tolerance * std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
+      limit.tolerance =
+          band_tolerance * std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
   } else {
-    for (const char* key : {"stretch", "compress"}) table.refuse(key, fmt::format("{} belongs to mode = \"band\"", key));
+    for (const char* key : {"stretch", "compress"})
+      table.refuse(key, fmt::format("{} belongs to mode = \"band\"", key));
   }
   if (table.find("stiffness")) {
     double stiffness = 0;
@@ -436,7 +442,8 @@ void read_limit(Table table, Scene& scene) {
   }
   if (const auto variant = table.choice("variant", {"second-order", "paper"}, {}))
     limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::second_order;
-  if (band && limit.variant == ProjectionVariant::paper) throw InputError(table.where() + ": variant = \"paper\" has no bands");
+  if (band && limit.variant == ProjectionVariant::paper)
+    throw InputError(table.where() + ": variant = \"paper\" has no bands");
   table.choice("solver", {"fast"}, {"lagrange", "springs"});
   table.choice("points", {"knot-mesh"}, {"gauss-2x2", "gauss-1", "cell-average", "greville"});
   table.number(limit.regularisation, "regularisation", dimension::none, Range::nonnegative);

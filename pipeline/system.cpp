@@ -139,8 +139,8 @@ double limit_stiffness(const Build& build, int panel) {
   return reserve * std::max({load / narrowest, own, shell.fabric.density});
 }
 
-// Masses of control points as strain rows weigh them: on closed panels what moves together counts together, so that a seam
-// is as stiff as any other line.
+// Masses of control points as strain rows weigh them: on closed panels what moves together counts together, so that a
+// seam is as stiff as any other line.
 Eigen::VectorXd row_masses(const Build& build) {
   Eigen::VectorXd mass = build.model->lumped_mass();
   const Eigen::VectorXd shared = build.dependence * (build.dependence.transpose() * mass);
@@ -266,7 +266,8 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
     if (limit.variant == ProjectionVariant::second_order) {
       std::vector<double> stiffness;
-      for (std::size_t k = 0; k < build.panels.size(); ++k) stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
+      for (std::size_t k = 0; k < build.panels.size(); ++k)
+        stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
       for (StrainRow& row : rows.strain) row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
     }
   }

@@ -2,6 +2,8 @@
 
 namespace toile {
 
-const char* version() { return TOILE_VERSION; }
+const char* version() {
+  return TOILE_VERSION;
+}
 
 }  // namespace toile

@@ -11,10 +11,10 @@ namespace toile {
 
 struct ConstraintPoint {
   PointKind kind = PointKind::vertex;
-  double u = 0, v = 0;           // knot coordinates bitwise
-  int loop = -1, curve = -1;     // the file's numbers; -1 for an inner vertex
-  double t = 0;                  // on the file's curve
-  bool used = true;              // false: the projection leaves it out, `why` says the reason
+  double u = 0, v = 0;        // knot coordinates bitwise
+  int loop = -1, curve = -1;  // the file's numbers; -1 for an inner vertex
+  double t = 0;               // on the file's curve
+  bool used = true;           // false: the projection leaves it out, `why` says the reason
   std::string why;
 };
 

@@ -29,7 +29,8 @@ struct PullBackOptions {
   double tolerance = 1e-9;  // relative to the diagonal of the surface's net
   // Length within which a coordinate counts as constant, unit of the net; at least the tolerance.
   double snap = 0;
-  // Largest distance of M from the surface, relative to the same diagonal. Where M lies off by d, c is followed to d / 100.
+  // Largest distance of M from the surface, relative to the same diagonal. Where M lies off by d, c is followed to d /
+  // 100.
   double max_distance = 0.1;
   // Where c begins, about: tells the two sides of a seam apart. Unset: a search over the whole surface.
   std::optional<Eigen::Vector2d> start = {};

@@ -26,10 +26,10 @@ const char* name(PointKind kind);  // "vertex", "crossing_u", ... as in `toile i
 // A trim curve meets knot lines. Listed in traversal order, loop by loop.
 struct TrimEvent {
   PointKind kind = PointKind::crossing_u;
-  int loop = 0, curve = 0;      // positions in TrimmedSurface::loops and TrimLoop::curves (not the file's numbers)
-  double t = 0;                 // on that curve as given (not reversed)
-  Eigen::Vector2d uv{0, 0};     // a knot coordinate is bitwise the knot
-  int line_u = -1, line_v = -1; // index into KnotMesh::u / v, -1: none
+  int loop = 0, curve = 0;       // positions in TrimmedSurface::loops and TrimLoop::curves (not the file's numbers)
+  double t = 0;                  // on that curve as given (not reversed)
+  Eigen::Vector2d uv{0, 0};      // a knot coordinate is bitwise the knot
+  int line_u = -1, line_v = -1;  // index into KnotMesh::u / v, -1: none
 };
 
 enum class CellKind : std::uint8_t { outside, cut, inside };
@@ -37,9 +37,9 @@ enum class VertexKind : std::uint8_t { outside, border, inside };
 
 // A piece of the boundary of the material inside one cell, in the direction that has the material on its left.
 struct BoundaryPiece {
-  int loop = -1, curve = -1;    // positions as in TrimEvent; -1: a straight piece of the cell's own border
-  double t0 = 0, t1 = 0;        // parameters on the curve as given; t0 > t1 where the loop traverses it backwards; the
-                                // curve's own knots may lie between them
+  int loop = -1, curve = -1;  // positions as in TrimEvent; -1: a straight piece of the cell's own border
+  double t0 = 0, t1 = 0;      // parameters on the curve as given; t0 > t1 where the loop traverses it backwards; the
+                              // curve's own knots may lie between them
   Eigen::Vector2d from{0, 0}, to{0, 0};
 };
 
@@ -63,15 +63,15 @@ struct PredicateCounts {
 struct TrimTopology {
   KnotMesh mesh;
   std::vector<TrimEvent> events;
-  std::vector<CellKind> cells;        // mesh.cell(i,j)
-  std::vector<VertexKind> vertices;   // mesh.vertex(i,j)
-  std::vector<CutCell> cut_cells;     // ordered by mesh.cell
-  TrimSpans spans;                    // the Bezier spans of the trims, about which all this was decided
+  std::vector<CellKind> cells;       // mesh.cell(i,j)
+  std::vector<VertexKind> vertices;  // mesh.vertex(i,j)
+  std::vector<CutCell> cut_cells;    // ordered by mesh.cell
+  TrimSpans spans;                   // the Bezier spans of the trims, about which all this was decided
   PredicateCounts counts;
 };
 
-// The trims must have passed validate_loops; throws GeometryError where they are found open, crossing or not nested. The
-// knot lines are those of `surface.surface`.
+// The trims must have passed validate_loops; throws GeometryError where they are found open, crossing or not nested.
+// The knot lines are those of `surface.surface`.
 TrimTopology trace_trims(const TrimmedSurface& surface);
 
 // Is the parameter point in the material (border included)?

@@ -119,9 +119,9 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
     report.kinetic += 0.5 * system.node_mass[k] * v_half.segment<3>(3 * k).squaredNorm();
     if (!system.projection) report.kinetic_end += 0.5 * system.node_mass[k] * next.v.segment<3>(3 * k).squaredNorm();
     const auto held = constraint.segment<3>(3 * k);
-    report.kick += 0.125 * dt * dt * system.node_mass[k] *
-                   std::max((state.a.segment<3>(3 * k) + held).squaredNorm(),
-                            (next.a.segment<3>(3 * k) + held).squaredNorm());
+    report.kick +=
+        0.125 * dt * dt * system.node_mass[k] *
+        std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (next.a.segment<3>(3 * k) + held).squaredNorm());
     report.drag_work -=
         system.node_drag[k] * (v_half.segment<3>(3 * k) - system.loads.wind).dot(move.segment<3>(3 * k));
   }

@@ -24,28 +24,28 @@ struct Loads {
 struct StepReport {
   double dt = 0;
   ProjectionReport projection;
-  ShellEnergy elastic;           // at the end
-  double limit_energy = 0;       // J, of the strain limits at the end
-  double kinetic = 0;            // J, in the middle of the step, where the velocity obeys the constraints
-  double kinetic_end = 0;        // J, at the end; without projection only, whose forces the velocity there lacks
-  double kick = 0;               // J, kinetic energy of half a step's acceleration: by so much `kinetic` depends on dt
-  double load_work = 0;          // J, work of dead loads in the step
-  double drag_work = 0;          // J, work of drag (negative: dissipated)
-  double motion_work = 0;        // J, work of moved pins
+  ShellEnergy elastic;      // at the end
+  double limit_energy = 0;  // J, of the strain limits at the end
+  double kinetic = 0;       // J, in the middle of the step, where the velocity obeys the constraints
+  double kinetic_end = 0;   // J, at the end; without projection only, whose forces the velocity there lacks
+  double kick = 0;          // J, kinetic energy of half a step's acceleration: by so much `kinetic` depends on dt
+  double load_work = 0;     // J, work of dead loads in the step
+  double drag_work = 0;     // J, work of drag (negative: dissipated)
+  double motion_work = 0;   // J, work of moved pins
   bool finite = true;
   double force_seconds = 0, projection_seconds = 0;  // wall time
 };
-// In the middle of a step, kinetic + mean of (elastic + limit_energy) at both ends - works up to the step - half the works
-// of the step never rises, up to the order of the scheme: what projection takes is lost, nothing is gained. Masses and drag
-// are the nodes' (design.md, "Numerics").
+// In the middle of a step, kinetic + mean of (elastic + limit_energy) at both ends - works up to the step - half the
+// works of the step never rises, up to the order of the scheme: what projection takes is lost, nothing is gained.
+// Masses and drag are the nodes' (design.md, "Numerics").
 
 // Everything a step needs that doesn't change from step to step. The caller keeps the parts alive.
 struct DynamicSystem {
   const ShellModel* model = nullptr;
   const AffineMap* map = nullptr;
-  Eigen::VectorXd node_mass, node_drag;    // reduced lumped mass with floor [kg], drag [kg/s]
+  Eigen::VectorXd node_mass, node_drag;  // reduced lumped mass with floor [kg], drag [kg/s]
   Loads loads;
-  FastProjection* projection = nullptr;    // null: no limits and no place rows
+  FastProjection* projection = nullptr;  // null: no limits and no place rows
 };
 
 // Accelerations (and nothing else) from places and velocities: for the start and after a change of the system.
@@ -61,8 +61,8 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt);
 // Force that each fixed control point and each place row exerts on the cloth [N] at the state's time, dt being the last
 // step's. A constraint's force is -J^T lambda / dt^2. Exact at rest: the sum balances the dead loads.
 struct Reactions {
-  Eigen::Matrix3Xd fixed;   // AffineMap::fixed order
-  Eigen::Matrix3Xd place;   // place rows
+  Eigen::Matrix3Xd fixed;  // AffineMap::fixed order
+  Eigen::Matrix3Xd place;  // place rows
 };
 Reactions reactions(const DynamicSystem& system, const DynamicState& state, double dt);
 

@@ -16,8 +16,8 @@ namespace {
 // Below this many rows the envelope factor below is faster than CHOLMOD (README, "Constraints").
 constexpr int envelope_rows = 1000;
 
-// One thread in BLAS and none of OpenMP's in CHOLMOD, which asks for four in each factorisation and waits for them longer than
-// it computes.
+// One thread in BLAS and none of OpenMP's in CHOLMOD, which asks for four in each factorisation and waits for them
+// longer than it computes.
 void single_blas_thread() {
   using Setter = void (*)(int);
   static const bool done = [] {
@@ -48,8 +48,7 @@ void breadth_first(const std::vector<std::vector<int>>& near, int start, std::ve
     const std::size_t first = order.size();
     for (int r : near[order[head++]])
       if (!seen[r]) seen[r] = 1, order.push_back(r);
-    std::stable_sort(order.begin() + first, order.end(),
-                     [&](int a, int b) { return near[a].size() < near[b].size(); });
+    std::stable_sort(order.begin() + first, order.end(), [&](int a, int b) { return near[a].size() < near[b].size(); });
   }
 }
 

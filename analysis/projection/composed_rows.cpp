@@ -37,8 +37,8 @@ ComposedRows compose(const AffineMap& map, const ConstraintRows& rows) {
   return out;
 }
 
-void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Matrix3Xd& fixed_places,
-              Eigen::Matrix3Xd& y) {
+void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>& x,
+              const Eigen::Matrix3Xd& fixed_places, Eigen::Matrix3Xd& y) {
   const double* places = x.data();
   for (int r = 0; r < rows.free.size(); ++r) {
     double s0 = 0, s1 = 0, s2 = 0;

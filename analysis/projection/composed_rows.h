@@ -24,8 +24,8 @@ struct ComposedRows {
 ComposedRows compose(const AffineMap& map, const ConstraintRows& rows);
 
 // y_r = sum over nodes and fixed control points; column r.
-void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Matrix3Xd& fixed_places,
-              Eigen::Matrix3Xd& y);
+void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>& x,
+              const Eigen::Matrix3Xd& fixed_places, Eigen::Matrix3Xd& y);
 
 // Lower triangle of D M^-1 D^T over scalar rows, which never changes: the scalar part of J M^-1 J^T.
 struct GramMatrix {

@@ -15,21 +15,21 @@ namespace toile {
 //   strain rows: d = N_,weft or N_,warp at a constraint point; C = (y.y - 1) / 2                 [eq. 36]
 //   place rows:  d = N at a pinned material point; C = y - target(t), three components, always an equality.
 struct ScalarRow {
-  std::vector<int> index;      // control points, ascending
+  std::vector<int> index;  // control points, ascending
   std::vector<double> value;
 };
 struct StrainRow {
   ScalarRow row;
   int panel = 0;
-  int point = 0;               // in the panel's constraint points
+  int point = 0;  // in the panel's constraint points
   bool warp = false;
-  double area = 0;             // m2, of the cloth that the row speaks for: sum of N_I mass_I over the density
-  double stiffness = 0;        // N m, force per strain times area; 0: hard
+  double area = 0;       // m2, of the cloth that the row speaks for: sum of N_I mass_I over the density
+  double stiffness = 0;  // N m, force per strain times area; 0: hard
 };
 struct PlaceRow {
   ScalarRow row;
-  int pin = 0;                                       // of the scene, for reactions and messages
-  std::function<Eigen::Vector3d(double)> target;     // place at time t [m]
+  int pin = 0;                                    // of the scene, for reactions and messages
+  std::function<Eigen::Vector3d(double)> target;  // place at time t [m]
 };
 
 struct ConstraintRows {
@@ -37,9 +37,9 @@ struct ConstraintRows {
   std::vector<PlaceRow> place;
 };
 
-// Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points() gives
-// them; `mass` of all control points [kg]. Functions that vanish at a point (all but p per direction on a C1 knot line)
-// are left out. Rows are hard.
+// Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points()
+// gives them; `mass` of all control points [kg]. Functions that vanish at a point (all but p per direction on a C1 knot
+// line) are left out. Rows are hard.
 std::vector<StrainRow> strain_rows(const ShellModel& model, const std::vector<std::vector<ConstraintPoint>>& points,
                                    const Eigen::VectorXd& mass);
 

@@ -14,11 +14,12 @@
 namespace toile {
 namespace {
 
-constexpr int patience = 15;           // iterations without gain before giving up; dependent rows make pauses of up to 10
-constexpr double least_gain = 0.99;    // a violation above this times the best so far is no gain
-constexpr double poor_gain = 0.25;     // an iteration that leaves more than this of the residual asks for a new factor
-constexpr double no_gain = 0.5;        // an iteration that leaves more than this means that the start's gradients no longer lead there
-constexpr double damped_residual = 0.1;  // what damps anyway needn't be exact
+constexpr int patience = 15;         // iterations without gain before giving up; dependent rows make pauses of up to 10
+constexpr double least_gain = 0.99;  // a violation above this times the best so far is no gain
+constexpr double poor_gain = 0.25;   // an iteration that leaves more than this of the residual asks for a new factor
+constexpr double no_gain =
+    0.5;  // an iteration that leaves more than this means that the start's gradients no longer lead there
+constexpr double damped_residual = 0.1;    // what damps anyway needn't be exact
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 
 }  // namespace
@@ -35,7 +36,7 @@ struct FastProjection::Impl {
   std::vector<double> gram_diagonal;  // per scalar row; 0: takes no part
   std::vector<int> system_scalar;     // scalar row of each system row
   SparsePattern pattern;
-  std::vector<double> gram, values;   // per entry of the pattern
+  std::vector<double> gram, values;  // per entry of the pattern
   std::unique_ptr<Cholesky> factor;
 
   Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
@@ -72,8 +73,8 @@ struct FastProjection::Impl {
   bool factorise(ProjectionReport& report);
   void correct(Eigen::Ref<Eigen::VectorXd> x);
   void push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x);
-  // Where the rows point while iterating: as they do, giving up where that gains nothing; along the candidate's gradients,
-  // renewed where that gains nothing; or along those of each iteration.
+  // Where the rows point while iterating: as they do, giving up where that gains nothing; along the candidate's
+  // gradients, renewed where that gains nothing; or along those of each iteration.
   enum class Directions { start, candidate, renewed };
   ProjectionReport iterate(Eigen::Ref<Eigen::VectorXd> x, Directions directions);
 };
@@ -176,8 +177,7 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
     residual.segment<3>(strains() + 3 * p) = gap;
     if (!(gap.norm() <= report.place_violation)) report.place_violation = gap.norm();
   }
-  report.converged =
-      report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
+  report.converged = report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
 }
 
 void FastProjection::Impl::point_along(const Eigen::Matrix3Xd& along) {
@@ -263,9 +263,10 @@ ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, Di
   bool factored = false;
   while (true) {
     measure(x, report);
-    const double excess = std::max({report.strain_violation / std::max(options.tolerance, 1e-30),
-                                    report.place_violation / std::max(options.place_tolerance, 1e-30),
-                                    report.residual / (directions == Directions::start ? options.residual : damped_residual)});
+    const double excess =
+        std::max({report.strain_violation / std::max(options.tolerance, 1e-30),
+                  report.place_violation / std::max(options.place_tolerance, 1e-30),
+                  report.residual / (directions == Directions::start ? options.residual : damped_residual)});
     if (size() == 0 || (report.converged && excess <= 1 && report.iterations >= options.min_iterations)) break;
     if (report.iterations >= options.max_iterations) break;
     if (!std::isfinite(excess)) break;
@@ -349,9 +350,15 @@ double FastProjection::energy(const Eigen::Ref<const Eigen::VectorXd>& x, double
   return s.limit_energy();
 }
 
-const Eigen::VectorXd& FastProjection::strain_multipliers() const { return impl_->strain_lambda; }
-const Eigen::Matrix3Xd& FastProjection::place_multipliers() const { return impl_->place_lambda; }
-const Eigen::Matrix3Xd& FastProjection::strain_impulses() const { return impl_->strain_impulse; }
+const Eigen::VectorXd& FastProjection::strain_multipliers() const {
+  return impl_->strain_lambda;
+}
+const Eigen::Matrix3Xd& FastProjection::place_multipliers() const {
+  return impl_->place_lambda;
+}
+const Eigen::Matrix3Xd& FastProjection::strain_impulses() const {
+  return impl_->strain_impulse;
+}
 ProjectionMemory FastProjection::memory() const {
   return {impl_->strain_lambda, impl_->place_lambda, impl_->strain_impulse};
 }
@@ -365,8 +372,14 @@ bool FastProjection::restore(const ProjectionMemory& memory) {
   s.strain_impulse = memory.strain_impulses;
   return true;
 }
-const ConstraintRows& FastProjection::rows() const { return impl_->rows; }
-const ProjectionOptions& FastProjection::options() const { return impl_->options; }
-std::size_t FastProjection::factor_nonzeros() const { return impl_->factor ? impl_->factor->factor_nonzeros() : 0; }
+const ConstraintRows& FastProjection::rows() const {
+  return impl_->rows;
+}
+const ProjectionOptions& FastProjection::options() const {
+  return impl_->options;
+}
+std::size_t FastProjection::factor_nonzeros() const {
+  return impl_->factor ? impl_->factor->factor_nonzeros() : 0;
+}
 
 }  // namespace toile

@@ -22,28 +22,29 @@ enum class ProjectionVariant {
 struct ProjectionOptions {
   ProjectionVariant variant = ProjectionVariant::second_order;
   StrainBand weft = {}, warp = {};  // limits of rows with a stiffness
-  double tolerance = 0.01;        // largest violation of a strain row that counts as met, see ProjectionReport
-  double place_tolerance = 1e-9;  // m, of place rows
+  double tolerance = 0.01;          // largest violation of a strain row that counts as met, see ProjectionReport
+  double place_tolerance = 1e-9;    // m, of place rows
   // Strain rows are solved until C - law(lambda) falls below this part of the band. A rest is energy from nowhere.
   double residual = 0.005;
-  // Added to the unit diagonal of the scaled strain rows. Dependent rows (an edge between two pins) need it where rows are
-  // hard; where they have a stiffness it only steadies the iteration. 1e-3: example 4.1(a) by the paper's variant gains no
-  // energy at the auto step and at 1, 2 and 4 ms; at 1e-4 it gains 0.5 % of the work of gravity at the auto step.
+  // Added to the unit diagonal of the scaled strain rows. Dependent rows (an edge between two pins) need it where rows
+  // are hard; where they have a stiffness it only steadies the iteration. 1e-3: example 4.1(a) by the paper's variant
+  // gains no energy at the auto step and at 1, 2 and 4 ms; at 1e-4 it gains 0.5 % of the work of gravity at the auto
+  // step.
   double regularisation = 1e-3;
   int min_iterations = 1;  // projecting at least once a step is smooth in dt
   int max_iterations = 50;
 };
 
 struct ProjectionReport {
-  bool converged = false;       // <=> strain_violation <= tolerance and place_violation <= place_tolerance
+  bool converged = false;  // <=> strain_violation <= tolerance and place_violation <= place_tolerance
   int iterations = 0;
   double strain_violation = 0;  // at the end: largest |C|, with slack in the band what C lies outside of it
   double place_violation = 0;   // m
   double residual = 0;          // largest |C - law(lambda)| of rows with a stiffness, over the band
-  bool damped = false;          // the start's gradients did not lead to the law's solution: the candidate's did, which damps
-  int worst_row = -1;           // strain row with the largest violation
-  double energy = 0;            // J, of the limit laws at the end
-  double factor_seconds = 0;    // wall time of the numeric factorisations
+  bool damped = false;  // the start's gradients did not lead to the law's solution: the candidate's did, which damps
+  int worst_row = -1;   // strain row with the largest violation
+  double energy = 0;    // J, of the limit laws at the end
+  double factor_seconds = 0;  // wall time of the numeric factorisations
 };
 
 // What the last projection left behind, for reactions: rows and shapes as below.
@@ -72,9 +73,10 @@ class FastProjection {
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t);
 
   // The same for the candidate x of a step from the state `start` at t - dt. Rows with a stiffness obey their law, with
-  // compliance 1 / (stiffness dt^2): M (x_after - x_before) = -J^T lambda, C(x_after) = law(lambda). Where the gradients at
-  // the start don't lead there (light nodes that turn far in a step), those of the candidate are taken.
-  ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>& start, double dt);
+  // compliance 1 / (stiffness dt^2): M (x_after - x_before) = -J^T lambda, C(x_after) = law(lambda). Where the
+  // gradients at the start don't lead there (light nodes that turn far in a step), those of the candidate are taken.
+  ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>& start,
+                        double dt);
 
   // Sum over the last projection's iterations of the multipliers, per row [kg m2 for strain rows, kg m for place rows]:
   // divided by dt^2 they are the constraint forces' quadrature weights [N m, N].

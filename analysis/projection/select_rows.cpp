@@ -13,10 +13,12 @@
 namespace toile {
 namespace {
 
-constexpr double dependent_place = 1e-9;       // pivot below which a pin says what others say already
-constexpr double contradiction = 1e-6;         // m
+constexpr double dependent_place = 1e-9;  // pivot below which a pin says what others say already
+constexpr double contradiction = 1e-6;    // m
 
-bool is_vertex(const ConstraintPoint& point) { return point.kind == PointKind::vertex; }
+bool is_vertex(const ConstraintPoint& point) {
+  return point.kind == PointKind::vertex;
+}
 
 // Position in cells: index of the cell and how far into it.
 double in_cells(const std::vector<double>& breaks, double u) {

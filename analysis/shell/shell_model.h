@@ -26,7 +26,7 @@ struct ShellPanel {
   NurbsSurface rest;
   CutQuadrature quadrature;
   Fabric fabric;
-  double grain = 0;  // rad
+  double grain = 0;                                // rad
   std::optional<Eigen::Vector3d> straight_u = {};  // unit; unset: d rest / du of each point
   // On C0 knot lines, see kink_points(); without them the cloth bends there for nothing.
   std::vector<KinkPoint> kinks = {};

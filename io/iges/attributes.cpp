@@ -1,4 +1,5 @@
-// Entities 124 (transformation), 212 (general note), 314 (colour), 406 form 15 (name). [IGES 5.3, 4.21, 4.60, 4.77, 4.98]
+// Entities 124 (transformation), 212 (general note), 314 (colour), 406 form 15 (name).
+// [IGES 5.3, 4.21, 4.60, 4.77, 4.98]
 #include "io/iges/entity.h"
 
 namespace toile::iges {
@@ -59,6 +60,8 @@ std::optional<std::string> read_name(Parameters& in) {
   return in.text("name");
 }
 
-void write_name(const std::string& name, Record& out) { out.integer(1).string(name); }
+void write_name(const std::string& name, Record& out) {
+  out.integer(1).string(name);
+}
 
 }  // namespace toile::iges

@@ -58,7 +58,8 @@ std::array<std::string, 2> make_cards(const Card& card) {
   return out;
 }
 
-std::string assemble(const std::vector<std::string>& start, std::string_view global, const std::vector<OutRecord>& records) {
+std::string assemble(const std::vector<std::string>& start, std::string_view global,
+                     const std::vector<OutRecord>& records) {
   std::size_t lines = start.size() + global.size() / 72 + 2 * records.size() + 2;
   for (const OutRecord& record : records) lines += record.lines.size() / 64;
   std::string out;
@@ -90,7 +91,8 @@ std::string assemble(const std::vector<std::string>& start, std::string_view glo
     }
   }
   std::string t;
-  for (const auto& [letter, count] : {std::pair('S', s.count()), {'G', g.count()}, {'D', d.count()}, {'P', p.count()}}) {
+  for (const auto& [letter, count] :
+       {std::pair('S', s.count()), {'G', g.count()}, {'D', d.count()}, {'P', p.count()}}) {
     std::string part(8, '0');
     part[0] = letter;
     put_number(part, 1, 7, count, '0');

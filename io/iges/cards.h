@@ -23,8 +23,9 @@ struct OutRecord {
   std::string lines;
 };
 
-// S, G, D, P and T sections, 80 columns a line, counters right. `global` is 72 columns a line. Throws OutputError where a
-// counter would need more than seven digits.
-std::string assemble(const std::vector<std::string>& start, std::string_view global, const std::vector<OutRecord>& records);
+// S, G, D, P and T sections, 80 columns a line, counters right. `global` is 72 columns a line. Throws OutputError where
+// a counter would need more than seven digits.
+std::string assemble(const std::vector<std::string>& start, std::string_view global,
+                     const std::vector<OutRecord>& records);
 
 }  // namespace toile::iges

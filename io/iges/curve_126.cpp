@@ -68,7 +68,7 @@ SplineCurve read_spline_curve(Parameters& in) {
   });
   if (!dropped.empty()) {
     in.note("surplus knots 126", "a knot occurs more often than the degree; " + std::to_string(dropped.size()) +
-                                 " control points that it makes idle are left out");
+                                     " control points that it makes idle are left out");
     for (auto i = dropped.rbegin(); i != dropped.rend(); ++i) {
       const Eigen::Index rest = points.cols() - 1 - *i;
       points.middleCols(*i, rest) = points.rightCols(rest).eval();

@@ -19,7 +19,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double believable = 1e-2;  // of the surface's size: model curves further off it bound something else
-constexpr double usable = 1e-3;  // of the domain; gaps and excursions beyond it are refused by validation
+constexpr double usable = 1e-3;      // of the domain; gaps and excursions beyond it are refused by validation
 
 Vector2d first(const TrimCurve& c) {
   return c.reversed ? c.curve.end() : c.curve.start();
@@ -129,8 +129,8 @@ class FaceMaker {
     return s_(uv.x(), uv.y());
   }
 
-  // How far a boundary's parameter curves, mapped, lie from its model curves: ends and middles of curves that are paired,
-  // else starts and middles against the nearest model curve.
+  // How far a boundary's parameter curves, mapped, lie from its model curves: ends and middles of curves that are
+  // paired, else starts and middles against the nearest model curve.
   double disagreement(const BoundaryCurves& b, const ParameterMap& map) const {
     double largest = 0;
     const auto image = [&](const Curve3& c, double f) {

@@ -23,7 +23,7 @@ struct Global {
   std::vector<std::string> fields;  // 3 to the last, strings without their count, numbers as written
   std::vector<bool> is_text;        // which of them were Hollerith strings
   std::string product, system, preprocessor;
-  std::string unit;                 // canonical name: "MM", "INCH", ...
+  std::string unit;  // canonical name: "MM", "INCH", ...
   int unit_flag = 1;
   double scale = 1;                 // field 13: length in the model / length in the world
   double metres_per_unit = 0.0254;  // of a model length: the unit divided by the scale
@@ -89,7 +89,8 @@ struct File {
 };
 
 // Splits bytes into sections: any line ends or none, misaligned columns, lines after T, control-Z, wrong counts.
-// Throws InputError where there is no directory to speak of, or where the file was cut off before its last record ended.
+// Throws InputError where there is no directory to speak of, or where the file was cut off before its last record
+// ended.
 std::shared_ptr<const File> parse_file(std::string_view text, const std::string& name);
 
 // Length units by flag (1 to 11) or by name.

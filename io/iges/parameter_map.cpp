@@ -25,7 +25,8 @@ struct ArcPlace {
 ArcPlace arc_place(const Turn& turn, double x) {
   const double width = turn.range.length() / turn.arcs;
   const double k = std::floor((x - turn.range.min) / width);
-  return {turn.range.min + (k + 0.5) * width, 0.5 * width, turn.sweep / turn.range.length(), 0.5 * turn.sweep / turn.arcs};
+  return {turn.range.min + (k + 0.5) * width, 0.5 * width, turn.sweep / turn.range.length(),
+          0.5 * turn.sweep / turn.arcs};
 }
 
 }  // namespace

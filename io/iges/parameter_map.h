@@ -13,7 +13,7 @@ namespace toile::iges {
 //   (1) Continuous and increasing for scale > 0; C1 within a turn.
 //   (2) A lone turn goes on beyond its range, by further arcs of its kind.
 struct Turn {
-  Interval range;    // in both parameters alike
+  Interval range;  // in both parameters alike
   int arcs = 1;
   double sweep = 0;  // angle over the range [rad]
 };

@@ -13,8 +13,12 @@ namespace toile::iges {
 
 namespace {
 
-bool is_blank(char c) { return static_cast<unsigned char>(c) <= ' '; }
-bool is_digit(char c) { return '0' <= c && c <= '9'; }
+bool is_blank(char c) {
+  return static_cast<unsigned char>(c) <= ' ';
+}
+bool is_digit(char c) {
+  return '0' <= c && c <= '9';
+}
 
 std::string_view trim(std::string_view s) {
   while (!s.empty() && is_blank(s.front())) s.remove_prefix(1);
@@ -138,7 +142,9 @@ void Parameters::note(const std::string& kind, const std::string& what) const {
   if (notes_) notes_->add(kind, file_.place(entry_) + what);
 }
 
-bool Parameters::defaulted() const { return next_ >= tokens_.list.size() || tokens_.list[next_].text.empty(); }
+bool Parameters::defaulted() const {
+  return next_ >= tokens_.list.size() || tokens_.list[next_].text.empty();
+}
 
 double Parameters::real(const char* what, int number, double otherwise) {
   if (next_ >= tokens_.list.size()) {
@@ -176,7 +182,8 @@ std::string Parameters::text(const char* what) {
 
 void Parameters::expect(long long count, const std::string& claim) const {
   if (count > left())
-    fail(claim + " need " + std::to_string(count) + " more parameters, the record has " + std::to_string(std::max(0, left())));
+    fail(claim + " need " + std::to_string(count) + " more parameters, the record has " +
+         std::to_string(std::max(0, left())));
 }
 
 void Parameters::fail(const std::string& why) const {
@@ -195,10 +202,13 @@ void Parameters::fail(const std::string& why) const {
 void Parameters::fail_token(const char* what, int number, std::string_view text, const char* expected) const {
   std::string shown;
   for (char c : text.substr(0, 24)) shown += 32 <= c && c < 127 ? c : '?';
-  fail(std::string(what) + (number >= 0 ? " " + std::to_string(number) : "") + " is '" + shown + "', must be " + expected);
+  fail(std::string(what) + (number >= 0 ? " " + std::to_string(number) : "") + " is '" + shown + "', must be " +
+       expected);
 }
 
-Record::Record(int type, Delimiters delimiters) : type_(type), delimiters_(delimiters) { integer(type); }
+Record::Record(int type, Delimiters delimiters) : type_(type), delimiters_(delimiters) {
+  integer(type);
+}
 
 Record Record::global(Delimiters delimiters) {
   Record record(delimiters, 72);
@@ -231,9 +241,15 @@ Record& Record::token(const Token& value) {
   return *this;
 }
 
-Record& Record::integer(long long value) { return token({std::to_string(value), false}); }
-Record& Record::real(double value) { return token({format_real(value), false}); }
-Record& Record::blank() { return token({"", false}); }
+Record& Record::integer(long long value) {
+  return token({std::to_string(value), false});
+}
+Record& Record::real(double value) {
+  return token({format_real(value), false});
+}
+Record& Record::blank() {
+  return token({"", false});
+}
 
 Record& Record::string(std::string_view value) {
   if (!first_) put(pending_ += delimiters_.parameter, pending_breakable_);

@@ -1,4 +1,5 @@
-// Parameters of a record: cut at delimiters, read as numbers and strings, errors with line, entity and what was expected.
+// Parameters of a record: cut at delimiters, read as numbers and strings, errors with line, entity and what was
+// expected.
 #pragma once
 
 #include <optional>
@@ -18,8 +19,8 @@ struct Token {
 
 struct Tokens {
   std::vector<Token> list;
-  bool terminated = false;    // the record delimiter was found
-  bool wrong_count = false;   // a Hollerith count did not fit; the nearest delimiter was taken
+  bool terminated = false;   // the record delimiter was found
+  bool wrong_count = false;  // a Hollerith count did not fit; the nearest delimiter was taken
 };
 
 // Cuts `text` up to the record delimiter.
@@ -30,8 +31,9 @@ void tokenize(std::string_view text, Delimiters delimiters, Tokens& out);
 std::optional<double> parse_real(std::string_view text);
 std::optional<int> parse_integer(std::string_view text);
 
-// Reads the parameters of one record in order. Defaulted parameters (nothing between two delimiters, or beyond the end of
-// the record) give the default. Every error is an InputError: `panel.igs:412: entity 128: weight 7 is 'x', must be a number`.
+// Reads the parameters of one record in order. Defaulted parameters (nothing between two delimiters, or beyond the end
+// of the record) give the default. Every error is an InputError: `panel.igs:412: entity 128: weight 7 is 'x', must be a
+// number`.
 class Parameters {
  public:
   // Throws where the record is missing, isn't terminated, or belongs to another entity type.

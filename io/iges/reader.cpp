@@ -278,8 +278,8 @@ std::vector<BoundaryCurves> seen_from(const Eigen::Affine3d& t, const std::vecto
   return out;
 }
 
-// The surface before its own matrix `t`, and the boundaries alike; but planes are placed at once, so that their corners and
-// their boundaries' parameters are the same numbers.
+// The surface before its own matrix `t`, and the boundaries alike; but planes are placed at once, so that their corners
+// and their boundaries' parameters are the same numbers.
 FileSurface Reader::own_surface(const Entry& e, const Eigen::Affine3d& t, const std::vector<BoundaryCurves>& boundaries,
                                 std::string& name, int depth) {
   if (depth > max_depth) throw InputError(file_.place(e) + "its surfaces form a cycle");
@@ -381,7 +381,8 @@ FileSurface Reader::own_surface(const Entry& e, const Eigen::Affine3d& t, const 
   return out;
 }
 
-FileSurface Reader::surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name, int depth) {
+FileSurface Reader::surface(const Entry& e, const std::vector<BoundaryCurves>& boundaries, std::string& name,
+                            int depth) {
   const Eigen::Affine3d t = transform(e);
   const bool as_they_are = e.type == 108 || e.type == 128 || e.type == 190 || is_identity(t);
   FileSurface out;

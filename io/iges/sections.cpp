@@ -13,9 +13,15 @@ namespace {
 
 constexpr std::size_t section_column = 72;  // 0-based column of the section letter
 
-bool is_blank(char c) { return static_cast<unsigned char>(c) <= ' '; }
-bool is_digit(char c) { return '0' <= c && c <= '9'; }
-bool is_section(char c) { return c == 'S' || c == 'G' || c == 'D' || c == 'P' || c == 'T'; }
+bool is_blank(char c) {
+  return static_cast<unsigned char>(c) <= ' ';
+}
+bool is_digit(char c) {
+  return '0' <= c && c <= '9';
+}
+bool is_section(char c) {
+  return c == 'S' || c == 'G' || c == 'D' || c == 'P' || c == 'T';
+}
 
 std::string_view trim(std::string_view s) {
   while (!s.empty() && is_blank(s.front())) s.remove_prefix(1);
@@ -62,7 +68,8 @@ void for_each_line(std::string_view text, Visit&& visit) {
     std::size_t end = text.find_first_of("\r\n", i);
     if (end == std::string_view::npos) end = text.size();
     std::string_view line = text.substr(i, end - i);
-    while (line.size() > 80 + section_column && is_section(line[section_column]) && is_section(line[80 + section_column])) {
+    while (line.size() > 80 + section_column && is_section(line[section_column]) &&
+           is_section(line[80 + section_column])) {
       if (!visit(line.substr(0, 80), ++number)) return;
       line.remove_prefix(80);
     }
@@ -133,8 +140,12 @@ void read_global(File& file, std::string_view text) {
   Tokens tokens;
   if (!ended) {
     tokenize(text.substr(std::min(i, text.size())), d, tokens);
-    if (!tokens.terminated) file.notes.add("global end", file.name + ":" + std::to_string(file.global_line) + ": global section: no record delimiter at its end");
-    if (tokens.wrong_count) file.notes.add("global hollerith", file.name + ":" + std::to_string(file.global_line) + ": global section: a string count is wrong");
+    if (!tokens.terminated)
+      file.notes.add("global end", file.name + ":" + std::to_string(file.global_line) +
+                                       ": global section: no record delimiter at its end");
+    if (tokens.wrong_count)
+      file.notes.add("global hollerith",
+                     file.name + ":" + std::to_string(file.global_line) + ": global section: a string count is wrong");
   }
   Global& g = file.global;
   for (const Token& t : tokens.list) {
@@ -212,8 +223,9 @@ void resolve_records(File& file) {
       while (end < total && owner(end) == entry.sequence) ++end;
       entry.count = end - entry.first;
       if (entry.first != pointer)
-        file.notes.add("parameter pointer",
-                       file.place(entry) + "its parameter pointer is wrong; the lines marked with its number are taken");
+        file.notes.add(
+            "parameter pointer",
+            file.place(entry) + "its parameter pointer is wrong; the lines marked with its number are taken");
     } else if (anonymous_starts.erase(pointer) != 0) {
       const auto next = anonymous_starts.upper_bound(pointer);
       const int limit = next == anonymous_starts.end() ? total : *next;
@@ -289,8 +301,10 @@ std::shared_ptr<const File> parse_file(std::string_view text, const std::string&
     if (trim(raw).empty()) return true;
     last_line = number;
     if (sections == 0 && raw.size() > section_column && (raw[section_column] == 'C' || raw[section_column] == 'B') &&
-        raw.size() <= 80 && trim(raw.substr(section_column + 1)).find_first_not_of("0123456789") == std::string_view::npos)
-      throw InputError(name + ":" + std::to_string(number) + ": " + (raw[section_column] == 'C' ? "compressed" : "binary") +
+        raw.size() <= 80 &&
+        trim(raw.substr(section_column + 1)).find_first_not_of("0123456789") == std::string_view::npos)
+      throw InputError(name + ":" + std::to_string(number) + ": " +
+                       (raw[section_column] == 'C' ? "compressed" : "binary") +
                        " IGES is not read, must be fixed-length ASCII");
     const Line line = classify(raw);
     if (line.section == 0) {
@@ -341,12 +355,15 @@ std::shared_ptr<const File> parse_file(std::string_view text, const std::string&
   if (sections == 0) throw InputError(name + ": no line has a section letter in column 73: this is no IGES file");
   if (global_lines == 0) throw InputError(name + ": the global section is missing");
   read_global(file, global);
-  if (directory.empty()) throw InputError(name + ":" + std::to_string(last_line) + ": the directory section is missing");
+  if (directory.empty())
+    throw InputError(name + ":" + std::to_string(last_line) + ": the directory section is missing");
   file.entries.reserve(directory.size() / 2);
   for (std::size_t i = 0; i + 1 < directory.size(); i += 2)
-    file.entries.push_back(read_entry(directory[i].data, directory[i + 1].data, directory[i].line, static_cast<int>(i) + 1));
+    file.entries.push_back(
+        read_entry(directory[i].data, directory[i + 1].data, directory[i].line, static_cast<int>(i) + 1));
   if (directory.size() % 2 != 0) {
-    if (!file.terminated) throw InputError(name + ":" + std::to_string(last_line) + ": the file ends in its directory section");
+    if (!file.terminated)
+      throw InputError(name + ":" + std::to_string(last_line) + ": the file ends in its directory section");
     note("odd directory", directory.back().line, "the directory has an odd number of lines; the last is ignored");
   }
   resolve_records(file);
@@ -364,8 +381,9 @@ std::shared_ptr<const File> parse_file(std::string_view text, const std::string&
     for (const Entry& entry : file.entries) {
       if (entry.count > 0) tokenize(file.record(entry), file.delimiters, tokens);
       if (entry.type != 0 && (entry.count == 0 || !tokens.terminated))
-        throw InputError(name + ":" + std::to_string(last_line) + ": the file ends early: no terminate line, and the record of " +
-                         "directory entry " + std::to_string(entry.sequence) + " (entity " + std::to_string(entry.type) +
+        throw InputError(name + ":" + std::to_string(last_line) +
+                         ": the file ends early: no terminate line, and the record of " + "directory entry " +
+                         std::to_string(entry.sequence) + " (entity " + std::to_string(entry.type) +
                          ") is not complete");
     }
     note("no T", last_line, "the terminate line is missing");

@@ -12,9 +12,9 @@ namespace toile::iges {
 
 std::vector<double> read_knots(Parameters& in, int count);
 
-// Knots that occur too often: control points that no span sees (knots more than degree + 1 times), and the second of two
-// equal ones at a knot that occurs degree + 1 times inside. `same(i, j)` says whether control points i and j are equal.
-// Returns those to leave out, ascending; their knots are taken out of `knots`.
+// Knots that occur too often: control points that no span sees (knots more than degree + 1 times), and the second of
+// two equal ones at a knot that occurs degree + 1 times inside. `same(i, j)` says whether control points i and j are
+// equal. Returns those to leave out, ascending; their knots are taken out of `knots`.
 template <class Same>
 std::vector<int> drop_surplus(int degree, std::vector<double>& knots, Same&& same) {
   std::vector<int> dropped;

@@ -13,7 +13,7 @@ namespace toile::iges {
 namespace {
 
 void drop_surplus_rows(Parameters& in, int m1, int m2, std::vector<double>& knots_u, std::vector<double>& knots_v,
-                  std::vector<double>& weights, Eigen::Matrix3Xd& points) {
+                       std::vector<double>& weights, Eigen::Matrix3Xd& points) {
   const int n1 = static_cast<int>(knots_u.size()) - m1 - 1, n2 = static_cast<int>(knots_v.size()) - m2 - 1;
   const auto same = [&](int i, int j) {
     return points.col(i) == points.col(j) &&
@@ -30,8 +30,9 @@ void drop_surplus_rows(Parameters& in, int m1, int m2, std::vector<double>& knot
     return true;
   });
   if (columns.empty() && rows.empty()) return;
-  in.note("surplus knots 128", "a knot occurs more often than the degree; " + std::to_string(columns.size() + rows.size()) +
-                               " rows of control points that it makes idle are left out");
+  in.note("surplus knots 128", "a knot occurs more often than the degree; " +
+                                   std::to_string(columns.size() + rows.size()) +
+                                   " rows of control points that it makes idle are left out");
   std::vector<int> kept;
   for (int j = 0; j < n2; ++j)
     for (int i = 0; i < n1; ++i)

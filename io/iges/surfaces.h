@@ -29,9 +29,7 @@ struct Frame {
     const Eigen::Vector3d d = p - origin;
     return {d.dot(x), d.dot(y), d.dot(z)};
   }
-  Frame placed(const Eigen::Affine3d& t) const {
-    return {t * origin, t.linear() * x, t.linear() * y, t.linear() * z};
-  }
+  Frame placed(const Eigen::Affine3d& t) const { return {t * origin, t.linear() * x, t.linear() * y, t.linear() * z}; }
 };
 
 // What a surface of the file became. Several `maps`: exporters disagree (degrees or radians); the first is the
@@ -39,8 +37,8 @@ struct Frame {
 struct FileSurface {
   NurbsSurface surface;
   std::vector<ParameterMap> maps = {{}};
-  double error = 0;  // of a surface that no NURBS is exactly
-  std::string how;    // empty: the file's own numbers
+  double error = 0;                 // of a surface that no NURBS is exactly
+  std::string how;                  // empty: the file's own numbers
   std::optional<Frame> plane = {};  // of a plane: its parameters are x and y there
 };
 

@@ -63,9 +63,7 @@ UnitCurve over_unit(const NaturalCurve& c) {
   UnitCurve out{with_domain(clamp(c.curve), {0, 1}), {}};
   for (const Turn& turn : c.turns)
     out.map.turns.push_back(
-        {{(turn.range.min - d.min) / d.length(), (turn.range.max - d.min) / d.length()},
-                              turn.arcs,
-                              turn.sweep});
+        {{(turn.range.min - d.min) / d.length(), (turn.range.max - d.min) / d.length()}, turn.arcs, turn.sweep});
   return out;
 }
 

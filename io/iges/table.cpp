@@ -40,14 +40,21 @@ bool rewrite_group(Parameters& in, Record& out) {
   return known;
 }
 
-Curve3 arc_curve(Parameters& in) { return to_curve(read_arc(in)); }
-Curve3 conic_curve(Parameters& in) { return to_curve(read_conic(in)); }
-Curve3 power_curve(Parameters& in) { return to_curve(read_power_spline(in)); }
+Curve3 arc_curve(Parameters& in) {
+  return to_curve(read_arc(in));
+}
+Curve3 conic_curve(Parameters& in) {
+  return to_curve(read_conic(in));
+}
+Curve3 power_curve(Parameters& in) {
+  return to_curve(read_power_spline(in));
+}
 
 // Forms 20 to 40 are drawings: centre lines, hatching, witness lines.
 Curve3 copious_curve(Parameters& in) {
   const int form = in.entry().form;
-  if (form >= 20 && form <= 40) in.fail("form " + std::to_string(form) + " is no curve, must be 1 to 3, 11 to 13 or 63");
+  if (form >= 20 && form <= 40)
+    in.fail("form " + std::to_string(form) + " is no curve, must be 1 to 3, 11 to 13 or 63");
   return to_curve(read_copious(in), form == 63);
 }
 

@@ -71,8 +71,8 @@ int FaceWriter::colour(const std::array<double, 3>& rgb) {
   return colours_[rgb] = add({.type = 314, .status = definition}, entity);
 }
 
-// The curves in the file's order and direction. A loop that is traversed against it has all its curves reversed; a curve
-// that alone runs against its loop is turned, so that what is written is head to tail.
+// The curves in the file's order and direction. A loop that is traversed against it has all its curves reversed; a
+// curve that alone runs against its loop is turned, so that what is written is head to tail.
 std::vector<Curve2> in_file_order(const TrimLoop& loop) {
   std::vector<const TrimCurve*> curves;
   for (const TrimCurve& c : loop.curves) curves.push_back(&c);
@@ -103,9 +103,11 @@ int FaceWriter::boundary(const TrimLoop& loop, const NurbsSurface& surface, int 
     model_curves.push_back(curve(model.curve, dependent));
   }
   const int model_chain = chain(model_curves, dependent);
-  return add({.type = 142, .status = dependent},
-             Boundary{.creation = 0, .surface = surface_number, .parameter_curve = parameter_chain,
-                      .model_curve = model_chain, .preference = 1});
+  return add({.type = 142, .status = dependent}, Boundary{.creation = 0,
+                                                          .surface = surface_number,
+                                                          .parameter_curve = parameter_chain,
+                                                          .model_curve = model_chain,
+                                                          .preference = 1});
 }
 
 void FaceWriter::add(const OutputFace& output) {
@@ -179,7 +181,8 @@ std::string date_of(const IgesHeader& header) {
   return format_date(std::clamp(seconds, 0, last));
 }
 
-std::string global_section(const IgesHeader& header, const Unit& unit, double scale, double resolution, double largest) {
+std::string global_section(const IgesHeader& header, const Unit& unit, double scale, double resolution,
+                           double largest) {
   const std::string date = date_of(header);
   Record g = Record::global();
   g.string(header.product).string(header.product + ".igs").string("toile").string("toile");

@@ -22,9 +22,8 @@ Matrix sample_dependence() {
 }
 
 AffineMap sample_map() {
-  return AffineMap(sample_dependence(), {3, 0}, [](std::size_t k, double t) {
-    return Eigen::Vector3d(double(k), t, 1 + t * double(k));
-  });
+  return AffineMap(sample_dependence(), {3, 0},
+                   [](std::size_t k, double t) { return Eigen::Vector3d(double(k), t, 1 + t * double(k)); });
 }
 
 Eigen::VectorXd random_vector(int n, unsigned seed) {

@@ -1,4 +1,5 @@
-// A flat polynomial unit square in x and y with everything that projection needs to know about it, without a shell model.
+// A flat polynomial unit square in x and y with everything that projection needs to know about it, without a shell
+// model.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,9 +14,9 @@ namespace toile::test {
 
 struct FlatCloth {
   KnotVector knots;
-  int n = 0;               // control points per direction
-  Eigen::VectorXd rest;    // 3 n^2
-  Eigen::VectorXd mass;    // n^2, row sums at 1 kg/m2
+  int n = 0;             // control points per direction
+  Eigen::VectorXd rest;  // 3 n^2
+  Eigen::VectorXd mass;  // n^2, row sums at 1 kg/m2
 };
 
 inline FlatCloth flat_cloth(int degree, int spans) {

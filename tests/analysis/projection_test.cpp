@@ -1,11 +1,10 @@
-#include "analysis/projection/fast_projection.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <random>
 
 #include "analysis/flat_cloth.h"
+#include "analysis/projection/fast_projection.h"
 #include "geometry/error.h"
 #include "support/near.h"
 
@@ -30,11 +29,12 @@ Eigen::VectorXd disturbed(const Eigen::VectorXd& q, double size, unsigned seed) 
 AffineMap two_corners(const FlatCloth& c) {
   const Eigen::VectorXd rest = c.rest;
   const std::vector<int> corners{0, c.n - 1};
-  return AffineMap(AffineMap::identity(c.n * c.n), corners, [rest, corners](std::size_t k, double) {
-    return Eigen::Vector3d(rest.segment<3>(3 * corners[k]));
-  });
+  return AffineMap(AffineMap::identity(c.n * c.n), corners,
+                   [rest, corners](std::size_t k, double) { return Eigen::Vector3d(rest.segment<3>(3 * corners[k])); });
 }
-AffineMap free_map(const FlatCloth& c) { return AffineMap(AffineMap::identity(c.n * c.n), {}, nullptr); }
+AffineMap free_map(const FlatCloth& c) {
+  return AffineMap(AffineMap::identity(c.n * c.n), {}, nullptr);
+}
 
 double largest_strain(const std::vector<StrainRow>& rows, const Eigen::VectorXd& q) {
   double largest = 0;
@@ -199,9 +199,9 @@ TEST(FastProjection, RowsOnFixedControlPointsOnlyTakeNoPart) {
 TEST(FastProjection, ContradictingRowsEndUnconvergedAndFinite) {
   const FlatCloth c = flat_cloth(2, 8);
   const auto place = [](double x) { return [x](double) { return Eigen::Vector3d(x, 0.5, 0); }; };
-  FastProjection projection(free_map(c), c.mass,
-                            {vertex_rows(c),
-                             {{scalar_row(c, 0, 0.5, 0), 0, place(0.0)}, {scalar_row(c, 1, 0.5, 0), 1, place(1.3)}}});
+  FastProjection projection(
+      free_map(c), c.mass,
+      {vertex_rows(c), {{scalar_row(c, 0, 0.5, 0), 0, place(0.0)}, {scalar_row(c, 1, 0.5, 0), 1, place(1.3)}}});
   Eigen::VectorXd x = c.rest;
   const ProjectionReport report = projection.project(x, 0);
   EXPECT_FALSE(report.converged);
@@ -226,7 +226,8 @@ TEST(FastProjection, RefusesPinsOnFixedControlPointsAndNodesWithoutMass) {
   const FlatCloth c = flat_cloth(2, 8);
   const AffineMap map = two_corners(c);
   const auto target = [](double) { return Eigen::Vector3d(0, 0, 0); };
-  EXPECT_THROW(FastProjection(map, map.reduce_scalar(c.mass), {{}, {{scalar_row(c, 0, 0, 0), 3, target}}}), SolverError);
+  EXPECT_THROW(FastProjection(map, map.reduce_scalar(c.mass), {{}, {{scalar_row(c, 0, 0, 0), 3, target}}}),
+               SolverError);
   Eigen::VectorXd mass = map.reduce_scalar(c.mass);
   mass[5] = 0;
   EXPECT_THROW(FastProjection(map, mass, {vertex_rows(c), {}}), SolverError);

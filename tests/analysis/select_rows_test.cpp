@@ -61,8 +61,8 @@ Strip trimmed_strip(double width, double height, double cell, double angle) {
   TrimmedSurface surface;
   surface.surface = flat.with_points(turn * (flat.points().colwise() - Eigen::Vector3d(half, half, 0)));
   const Eigen::Rotation2Dd back(-angle);
-  const Eigen::Vector2d corners[] = {{-width / 2, -height / 2}, {width / 2, -height / 2}, {width / 2, height / 2},
-                                     {-width / 2, height / 2}};
+  const Eigen::Vector2d corners[] = {
+      {-width / 2, -height / 2}, {width / 2, -height / 2}, {width / 2, height / 2}, {-width / 2, height / 2}};
   TrimLoop loop;
   for (int k = 0; k < 4; ++k) {
     TrimCurve curve{line_segment<2>(back * corners[k], back * corners[(k + 1) % 4]), k, false, {}};
@@ -101,7 +101,8 @@ struct Rolled {
   int iterations = 0;
 };
 
-// Bending energy of the strip on a cylinder of the given radius about y, after its rows are met to a tenth of the usual limit.
+// Bending energy of the strip on a cylinder of the given radius about y, after its rows are met to a tenth of the usual
+// limit.
 Rolled roll(Strip strip, double radius) {
   std::vector<ShellPanel> panels{strip.panel};
   const ShellModel model(std::move(panels));
@@ -179,9 +180,8 @@ TEST(SelectRows, PointsOnFixedControlPointsOnlyAreLeftOut) {
   std::vector<int> edge;
   const int n = strip.panel.rest.count_u();
   for (int k = 0; k < 2 * n; ++k) edge.push_back(k);  // two rows: a clamp
-  const AffineMap map(AffineMap::identity(model.control_point_count()), edge, [&](std::size_t k, double) {
-    return Eigen::Vector3d(model.rest().segment<3>(3 * edge[k]));
-  });
+  const AffineMap map(AffineMap::identity(model.control_point_count()), edge,
+                      [&](std::size_t k, double) { return Eigen::Vector3d(model.rest().segment<3>(3 * edge[k])); });
   const auto rows = select_rows(model, map, model.lumped_mass(), strip.points, {});
   for (const ConstraintPoint& point : strip.points[0]) {
     EXPECT_EQ(point.used, point.v > 0);

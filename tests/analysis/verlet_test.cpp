@@ -26,12 +26,12 @@ struct Scene {
     int degree = 2, spans = 8;
     Fabric fabric = {};
     std::vector<int> fixed = {};
-    AffineMap::Motion motion = {};      // unset: fixed control points stay at rest
+    AffineMap::Motion motion = {};  // unset: fixed control points stay at rest
     std::vector<Eigen::Vector2d> pins = {};
     bool limits = true;
     bool gravity = true;
     ProjectionOptions projection = {};
-    double stiffness = 1170;            // N/m, of the strain limit: ten weights of a square metre at 1 % strain
+    double stiffness = 1170;  // N/m, of the strain limit: ten weights of a square metre at 1 % strain
   };
 
   explicit Scene(const Options& o)
@@ -40,7 +40,8 @@ struct Scene {
           panels.push_back(test::make_flat_panel(o.size, o.size, o.degree, o.spans, o.spans, o.fabric));
           return panels;
         }()),
-        map(AffineMap::identity(model.control_point_count()), o.fixed,
+        map(
+            AffineMap::identity(model.control_point_count()), o.fixed,
             o.motion ? o.motion : [rest = model.rest(), fixed = o.fixed](std::size_t k, double) {
               return Eigen::Vector3d(rest.segment<3>(3 * fixed[k]));
             }) {

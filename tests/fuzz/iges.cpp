@@ -1,12 +1,13 @@
 // Any bytes give panels or an InputError; what gives panels comes back exactly when its records are written anew.
 // tests/fuzz/run iges SECONDS
+#include "io/iges.h"
+
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 
 #include "geometry/error.h"
-#include "io/iges.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

@@ -28,9 +28,13 @@ TEST(CubicFit, StaysWithinItsToleranceAndSaysHowFar) {
 }
 
 TEST(CubicFit, KeepsAKink) {
-  const std::vector<SmoothPath<2>> path{
-      {{0, 1}, [](double t) { return PathPoint<2>{{t, 0}, {1, 0}}; }},
-      {{1, 2}, [](double t) { return PathPoint<2>{{1, t - 1}, {0, 1}}; }}};
+  const std::vector<SmoothPath<2>> path{{{0, 1},
+                                         [](double t) {
+                                           return PathPoint<2>{{t, 0}, {1, 0}};
+                                         }},
+                                        {{1, 2}, [](double t) {
+                                           return PathPoint<2>{{1, t - 1}, {0, 1}};
+                                         }}};
   const CubicFit<2> fit = fit_cubic<2>(path, {.tolerance = 1e-12});
   EXPECT_EQ(fit.curve(1), Eigen::Vector2d(1, 0));
   EXPECT_LE(fit.error, 1e-15);

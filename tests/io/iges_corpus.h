@@ -15,9 +15,13 @@ inline std::filesystem::path corpus(const std::string& name) {
   return std::filesystem::path(TOILE_TEST_DATA) / "iges" / (name + ".igs");
 }
 
-inline std::string corpus_text(const std::string& name) { return read_file(corpus(name)); }
+inline std::string corpus_text(const std::string& name) {
+  return read_file(corpus(name));
+}
 
-inline PanelFile read_corpus(const std::string& name) { return parse_iges(corpus_text(name), name + ".igs"); }
+inline PanelFile read_corpus(const std::string& name) {
+  return parse_iges(corpus_text(name), name + ".igs");
+}
 
 // Names of all files in a folder of the corpus, sorted.
 inline std::vector<std::string> corpus_names(const std::string& folder = "") {

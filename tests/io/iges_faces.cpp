@@ -83,7 +83,8 @@ TEST(IgesFaces, ASolidGivesItsFacesWhereItsMatrixPutsThem) {
 }
 
 TEST(IgesFaces, ACylinderIsWholeWhateverItsParametersCount) {
-  for (const char* name : {"cylinder_192_degrees", "cylinder_192_radians", "cylinder_192_model_only", "cylinder_no_seam"}) {
+  for (const char* name :
+       {"cylinder_192_degrees", "cylinder_192_radians", "cylinder_192_model_only", "cylinder_no_seam"}) {
     SCOPED_TRACE(name);
     expect_near_rel(areas(name).at(0), 2 * pi * 20 * 60, 1e-9);
   }
@@ -142,7 +143,8 @@ TEST(IgesFaces, FreeSweptSurfacesArePanels) {
   expect_near_rel(surface_area(file.panels[2].surface), 30 * pi / 2 * 80, 1e-9);
   for (double u : {0.0, 0.3, 1.0})
     for (double v : {0.0, 0.7, 2.0})
-      EXPECT_LE((file.panels[3].surface(u, v) - Eigen::Vector3d(600 + 50 * u, 40 * v, 5 * u * u + 3 * u * v)).norm(), 1e-12);
+      EXPECT_LE((file.panels[3].surface(u, v) - Eigen::Vector3d(600 + 50 * u, 40 * v, 5 * u * u + 3 * u * v)).norm(),
+                1e-12);
   const NurbsSurface& offset = file.panels[4].surface;
   for (double u : {0.0, 0.4, 0.9})
     for (double v : {0.1, 0.8}) {

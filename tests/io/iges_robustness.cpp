@@ -33,7 +33,8 @@ TEST(IgesRobustness, CutAtEveryByteAFileIsWholeOrRefused) {
 TEST(IgesRobustness, FlippedBytesGiveErrorsOrFilesThatRoundTrip) {
   const std::uint32_t seed = 20261122;
   std::mt19937 random(seed);
-  const std::vector<std::string> names{"hole_and_composite", "transforms", "delimiters", "model_curves_only", "quarantine"};
+  const std::vector<std::string> names{"hole_and_composite", "transforms", "delimiters", "model_curves_only",
+                                       "quarantine"};
   int read = 0, refused = 0;
   for (const std::string& name : names) {
     const std::string source = test::corpus_text(name);

@@ -27,9 +27,13 @@ TEST(IgesTokens, DelimitersInsideStringsDoNotCut) {
   EXPECT_EQ(texts("406,1,7Ha;b,c;d;comment"), (List{"406", "1", "a;b,c;d"}));
 }
 
-TEST(IgesTokens, BlanksAroundParametersFall) { EXPECT_EQ(texts(" 1 ,  2.5 , 3H a ;"), (List{"1", "2.5", " a "})); }
+TEST(IgesTokens, BlanksAroundParametersFall) {
+  EXPECT_EQ(texts(" 1 ,  2.5 , 3H a ;"), (List{"1", "2.5", " a "}));
+}
 
-TEST(IgesTokens, NothingBetweenDelimitersIsADefault) { EXPECT_EQ(texts("1,,,4;"), (List{"1", "", "", "4"})); }
+TEST(IgesTokens, NothingBetweenDelimitersIsADefault) {
+  EXPECT_EQ(texts("1,,,4;"), (List{"1", "", "", "4"}));
+}
 
 TEST(IgesTokens, WrongStringCountEndsAtTheNearestDelimiter) {
   EXPECT_EQ(texts("1,9Hshort,2;"), (List{"1", "short", "2"}));
@@ -37,7 +41,9 @@ TEST(IgesTokens, WrongStringCountEndsAtTheNearestDelimiter) {
   EXPECT_EQ(texts("1,99999Hhuge,2;"), (List{"1", "huge", "2"}));
 }
 
-TEST(IgesTokens, OtherDelimitersAreHonoured) { EXPECT_EQ(texts("1/2,5/3#4", {'/', '#'}), (List{"1", "2,5", "3"})); }
+TEST(IgesTokens, OtherDelimitersAreHonoured) {
+  EXPECT_EQ(texts("1/2,5/3#4", {'/', '#'}), (List{"1", "2,5", "3"}));
+}
 
 TEST(IgesTokens, TheRecordDelimiterEndsTheRecord) {
   Tokens tokens;
@@ -49,9 +55,17 @@ TEST(IgesTokens, TheRecordDelimiterEndsTheRecord) {
 }
 
 TEST(IgesReal, ReadsEveryFormThatExportersWrite) {
-  for (const auto& [text, value] : std::vector<std::pair<std::string, double>>{{"1", 1}, {"1.", 1}, {".5", 0.5}, {"+2.5", 2.5},
-                                                     {"-0.", 0}, {"1.5E2", 150}, {"1.5E+02", 150}, {"1.5D2", 150},
-                                                     {"1.5d-02", 0.015}, {"-1D+00", -1}, {"1E-400", 0}}) {
+  for (const auto& [text, value] : std::vector<std::pair<std::string, double>>{{"1", 1},
+                                                                               {"1.", 1},
+                                                                               {".5", 0.5},
+                                                                               {"+2.5", 2.5},
+                                                                               {"-0.", 0},
+                                                                               {"1.5E2", 150},
+                                                                               {"1.5E+02", 150},
+                                                                               {"1.5D2", 150},
+                                                                               {"1.5d-02", 0.015},
+                                                                               {"-1D+00", -1},
+                                                                               {"1E-400", 0}}) {
     const std::optional<double> read = parse_real(text);
     ASSERT_TRUE(read) << text;
     EXPECT_EQ(*read, value) << text;

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <cstdlib>
+#include <limits>
 
 #include "geometry/error.h"
 #include "geometry/refine.h"

@@ -67,8 +67,8 @@ TEST(Inspect, AFaceWithoutATrimHasEveryKnotVertexAndNothingElse) {
 
 TEST(Inspect, JsonHasTheFieldsOfTheContract) {
   const auto json = inspect_json(inspect(flat_panel(true)));
-  EXPECT_EQ(keys(json), (std::vector<std::string>{"file", "unit", "exporter", "warnings", "entities", "panels", "refused",
-                                                  "ledger"}));
+  EXPECT_EQ(keys(json), (std::vector<std::string>{"file", "unit", "exporter", "warnings", "entities", "panels",
+                                                  "refused", "ledger"}));
   EXPECT_EQ(json.at("entities"), (nlohmann::ordered_json{{"128", 1}, {"144", 1}}));
   const auto& panel = json.at("panels").at(0);
   EXPECT_EQ(keys(panel), (std::vector<std::string>{"name", "degree", "control_points", "rational", "knots", "domain",

@@ -234,9 +234,10 @@ TEST(Program, AUsedDirectoryIsKeptUnlessOverwritten) {
 
 TEST(Program, AnUnmetLimitIsExit6) {
   const Small folder("limit");
-  const Outcome run = toile(
-      folder, "drape scene.toml -o result --set strain_limit.variant=paper --set strain_limit.tolerance=1e-15 "
-              "--set strain_limit.max_iterations=1");
+  const Outcome run =
+      toile(folder,
+            "drape scene.toml -o result --set strain_limit.variant=paper --set strain_limit.tolerance=1e-15 "
+            "--set strain_limit.max_iterations=1");
   EXPECT_EQ(run.code, 6) << run.err;
   EXPECT_NE(run.err.find("strain limit is not met"), std::string::npos) << run.err;
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "check");
