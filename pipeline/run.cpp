@@ -65,6 +65,7 @@ class Loop {
     for (int i = 0; i < build_.model->control_point_count(); ++i) {
       result_.energy.gravity -= build_.model->lumped_mass()[i] * scene_.gravity.dot(moved.segment<3>(3 * i));
     }
+    warn_of_injected_energy();
     result_.wall_seconds = since(start_);
     return std::move(result_);
   }
@@ -173,6 +174,18 @@ class Loop {
                                    result_.exit == RunExit::time_limit ? "stopped by the time limit" : "interrupted",
                                    result_.state.t, scene_.until);
     }
+  }
+
+  // Less than what ends a run, but more than a stable one should gain.
+  void warn_of_injected_energy() {
+    constexpr double noticeable = 0.01;
+    const EnergyBalance& e = result_.energy;
+    const double turned = std::max({std::abs(e.load_work), std::abs(e.motion_work), e.start});
+    if (!(e.injected > noticeable * turned) || !(e.injected > result_.loop.rounding)) return;
+    result_.warnings.push_back(
+        fmt::format("the energy rose by {:.2g} % of what was turned over without work that would explain it: a smaller dt "
+                    "or a lower strain_limit.stiffness is more accurate",
+                    100 * e.injected / turned));
   }
 
   // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest /
