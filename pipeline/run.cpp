@@ -179,13 +179,17 @@ class Loop {
   // Less than what ends a run, but more than a stable one should gain.
   void warn_of_injected_energy() {
     constexpr double noticeable = 0.01;
+    constexpr std::string_view start = "the energy rose by";
+    // A run that is taken up again judges anew.
+    std::erase_if(result_.warnings, [&](const std::string& warning) { return warning.starts_with(start); });
+    if (result_.exit == RunExit::interrupted || result_.exit == RunExit::time_limit) return;
     const EnergyBalance& e = result_.energy;
     const double turned = std::max({std::abs(e.load_work), std::abs(e.motion_work), e.start});
     if (!(e.injected > noticeable * turned) || !(e.injected > result_.loop.rounding)) return;
     result_.warnings.push_back(
-        fmt::format("the energy rose by {:.2g} % of what was turned over without work that would explain it: a smaller dt "
+        fmt::format("{} {:.2g} % of what was turned over without work that would explain it: a smaller dt "
                     "or a lower strain_limit.stiffness is more accurate",
-                    100 * e.injected / turned));
+                    start, 100 * e.injected / turned));
   }
 
   // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest /
