@@ -17,8 +17,7 @@ namespace {
 constexpr int patience = 15;         // iterations without gain before giving up; dependent rows make pauses of up to 10
 constexpr double least_gain = 0.99;  // a violation above this times the best so far is no gain
 constexpr double poor_gain = 0.25;   // an iteration that leaves more than this of the residual asks for a new factor
-constexpr double no_gain =
-    0.5;  // an iteration that leaves more than this means that the start's gradients no longer lead there
+constexpr double no_gain = 0.5;      // more than this left: the directions at hand no longer lead there
 constexpr double damped_residual = 0.1;    // what damps anyway needn't be exact
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 

@@ -135,7 +135,7 @@ class Balance {
 // The law that redundancy breaks most easily: two pinned corners make the rows of the edge between them dependent.
 TEST(Verlet, EnergyOfAnUndampedProjectedRunNeverRises) {
   for (const ProjectionVariant variant : {ProjectionVariant::second_order, ProjectionVariant::paper})
-    for (double dt : {2e-3, 1e-3, 5e-4}) {
+    for (double dt : {4e-3, 2e-3, 1e-3}) {
       Scene scene({.fabric = without_drag(), .fixed = {0, 9}, .projection = {.variant = variant}});
       Balance balance;
       double work = 0, most_work = 0, highest = 0;
