@@ -40,8 +40,11 @@ template <class T, class U>
 concept Like = std::same_as<std::remove_const_t<T>, U>;
 
 // What is kept of each struct, written and read alike. A new field is a word here.
+void fields(auto& archive, Like<ConstraintForces> auto& f) {
+  archive(f.strain, f.place);
+}
 void fields(auto& archive, Like<DynamicState> auto& s) {
-  archive(s.t, s.x, s.v, s.a);
+  archive(s.t, s.x, s.v, s.a, s.constraint);
 }
 void fields(auto& archive, Like<LoopState> auto& s) {
   archive(s.assembled, s.done, s.dt_scale, s.steps_since_bound, s.scale, s.balance, s.rounding, s.kick);

@@ -265,10 +265,18 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     const Eigen::VectorXd mass = row_masses(build).cwiseMax(build.mass_floor);
     rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
     if (limit.variant == ProjectionVariant::second_order) {
-      std::vector<double> stiffness;
-      for (std::size_t k = 0; k < build.panels.size(); ++k)
+      std::vector<double> stiffness, rate;
+      for (std::size_t k = 0; k < build.panels.size(); ++k) {
+        const ShellPanel& panel = build.model->panels()[k];
         stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
-      for (StrainRow& row : rows.strain) row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
+        // Slow vibrations of the limit lose in a step what waves cross of the panel and back: with half of it example
+        // 4.1(a) gains 6e-5 of the work of gravity at 4 ms, with all of it nothing.
+        rate.push_back(2 * std::sqrt(stiffness.back() / panel.fabric.density) / extent(panel));
+      }
+      for (StrainRow& row : rows.strain) {
+        row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
+        row.damping_rate = rate[static_cast<std::size_t>(row.panel)];
+      }
     }
   }
   for (std::size_t k = 0; k < build.panels.size(); ++k) system->points[k].resize(build.panels[k].points.size());

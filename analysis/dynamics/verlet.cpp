@@ -98,7 +98,8 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
   report.projection.converged = true;
   if (system.projection) {
     const auto start = std::chrono::steady_clock::now();
-    report.projection = system.projection->step(next.x, next.t, state.x, dt);
+    next.constraint = state.constraint;
+    report.projection = system.projection->step(next.x, next.t, state.x, dt, next.constraint);
     report.limit_energy = report.projection.energy;
     report.projection_seconds = seconds_since(start);
   }

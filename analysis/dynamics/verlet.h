@@ -9,10 +9,12 @@
 
 namespace toile {
 
-// Free nodes: places, velocities, accelerations at one time. Restartable bit by bit.
+// Free nodes: places, velocities, accelerations at one time; forces of the constraints up to then. Restartable bit by
+// bit.
 struct DynamicState {
   double t = 0;
   Eigen::VectorXd x, v, a;
+  ConstraintForces constraint;
 };
 
 // Dead loads on control points [N], 3 n: gravity on the true mass and tractions; wind [m/s] acts through drag.

@@ -23,8 +23,9 @@ struct StrainRow {
   int panel = 0;
   int point = 0;  // in the panel's constraint points
   bool warp = false;
-  double area = 0;       // m2, of the cloth that the row speaks for: sum of N_I mass_I over the density
-  double stiffness = 0;  // N m, force per strain times area; 0: hard
+  double area = 0;          // m2, of the cloth that the row speaks for: sum of N_I mass_I over the density
+  double stiffness = 0;     // N m, force per strain times area; 0: hard
+  double damping_rate = 0;  // 1/s, with a stiffness: see FastProjection::step
 };
 struct PlaceRow {
   ScalarRow row;

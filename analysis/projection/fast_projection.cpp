@@ -21,6 +21,11 @@ constexpr double no_gain = 0.5;      // more than this left: the directions at h
 constexpr double damped_residual = 0.1;    // what damps anyway needn't be exact
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 
+// Of the law's forces at the end of a step, at its start, one and two steps before: see `step`.
+Eigen::Vector4d force_weights(double damping) {
+  return damping * Eigen::Vector4d::Unit(0) + (1 - damping) / 27 * Eigen::Vector4d(8, 12, 6, 1);
+}
+
 }  // namespace
 
 // System rows: one per strain row, then three (x, y, z) per place row. Row i of J is (row of D) x direction_i: a
@@ -41,6 +46,7 @@ struct FastProjection::Impl {
   Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
   Eigen::VectorXd scale, residual, rhs, solution, candidate;
   Eigen::VectorXd strain_lambda, compliance;  // compliance 0: hard
+  Eigen::VectorXd share;                      // of the force at the end in what acts in a step
   std::vector<char> slack;                    // within the band without a force: takes no part for now
   Eigen::Matrix3Xd place_lambda, strain_impulse;
 
@@ -52,6 +58,7 @@ struct FastProjection::Impl {
   int size() const { return strains() + 3 * places(); }
   const StrainBand& band(int r) const { return rows.strain[r].warp ? options.warp : options.weft; }
   bool takes_part(int r) const { return gram_diagonal[r] > 0; }
+  bool has_law(int r) const { return takes_part(r) && rows.strain[r].stiffness > 0; }
   bool soft(int r) const { return compliance[r] > 0; }
   LimitLaw law(int r) const { return {band(r), compliance[r]}; }
   // The law of a row in forces instead of a step's multipliers.
@@ -60,13 +67,14 @@ struct FastProjection::Impl {
   double limit_energy() const {
     double sum = 0;
     for (int r = 0; r < strains(); ++r)
-      if (takes_part(r) && rows.strain[r].stiffness > 0) sum += force_law(r).energy(strain(y, r));
+      if (has_law(r)) sum += force_law(r).energy(strain(y, r));
     return sum;
   }
 
   void build(const Eigen::VectorXd& node_mass);
   void begin(double t);
   void clear();
+  void complete(ConstraintForces& forces) const;
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void point_along(const Eigen::Matrix3Xd& tangents);
   bool factorise(ProjectionReport& report);
@@ -129,6 +137,7 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   solution.resize(size());
   strain_lambda = Eigen::VectorXd::Zero(strains());
   compliance = Eigen::VectorXd::Zero(strains());
+  share = Eigen::VectorXd::Ones(strains());
   slack.assign(strains(), 0);
   place_lambda = Eigen::Matrix3Xd::Zero(3, places());
   strain_impulse = Eigen::Matrix3Xd::Zero(3, strains());
@@ -145,6 +154,16 @@ void FastProjection::Impl::clear() {
   strain_lambda.setZero();
   place_lambda.setZero();
   strain_impulse.setZero();
+}
+
+// Where nothing came before, what the strains at the start stand for.
+void FastProjection::Impl::complete(ConstraintForces& forces) const {
+  if (forces.strain.cols() != strains()) {
+    forces.strain.setZero(3, strains());
+    for (int r = 0; r < strains(); ++r)
+      if (has_law(r)) forces.strain.col(r).setConstant(force_law(r).multiplier(strain(tangents, r)));
+  }
+  if (forces.place.cols() != places()) forces.place.setZero(3, places());
 }
 
 void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
@@ -305,33 +324,53 @@ ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t
 }
 
 ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
-                                      const Eigen::Ref<const Eigen::VectorXd>& start, double dt) {
+                                      const Eigen::Ref<const Eigen::VectorXd>& start, double dt,
+                                      ConstraintForces& forces) {
   Impl& s = *impl_;
   if (s.options.variant == ProjectionVariant::paper) return project(x, t);
   s.fixed_places = s.map.fixed_places(t - dt);
   evaluate(s.composed, start, s.fixed_places, s.tangents);
   s.begin(t);
   s.point_along(s.tangents);
-  for (int r = 0; r < s.strains(); ++r)
-    if (s.takes_part(r) && s.rows.strain[r].stiffness > 0) s.compliance[r] = 1 / (s.rows.strain[r].stiffness * dt * dt);
-  // What held the state at the start is the first guess: the multipliers that its strains stand for.
-  s.rhs.setZero();
-  for (int r = 0; r < s.strains(); ++r)
-    if (s.soft(r)) s.rhs[r] = s.law(r).multiplier(s.strain(s.tangents, r)) / s.scale[r];
+  s.complete(forces);
+  const double dt2 = dt * dt;
   s.candidate = x;
+  // What the steps before are owed, and as a first guess that the forces stay as they are.
+  for (int r = 0; r < s.strains(); ++r) {
+    s.rhs[r] = 0;
+    if (!s.has_law(r)) continue;
+    const Eigen::Vector4d weights = force_weights(std::min(1.0, dt * s.rows.strain[r].damping_rate));
+    s.share[r] = weights[0];
+    s.compliance[r] = 1 / (s.share[r] * s.rows.strain[r].stiffness * dt2);
+    s.rhs[r] = dt2 * weights.tail<3>().dot(forces.strain.col(r)) / s.scale[r];
+  }
+  s.rhs.tail(3 * s.places()).setZero();
+  s.push(s.rhs, x);
+  s.strain_lambda.setZero();
+  for (int r = 0; r < s.strains(); ++r) s.rhs[r] = s.soft(r) ? s.share[r] * dt2 * forces.strain(0, r) / s.scale[r] : 0;
+  for (int i = s.strains(); i < s.size(); ++i)
+    s.rhs[i] = dt2 * forces.place((i - s.strains()) % 3, (i - s.strains()) / 3) / s.scale[i];
   s.push(s.rhs, x);
   ProjectionReport report = s.iterate(x, Impl::Directions::start);
-  if (report.converged && report.residual <= s.options.residual) return report;
-  // Light nodes at a trim may turn too far in a step: then along the candidate's gradients, from no force on.
-  x = s.candidate;
-  s.clear();
-  const ProjectionReport again = s.iterate(x, Impl::Directions::candidate);
-  const int iterations = report.iterations + again.iterations;
-  const double seconds = report.factor_seconds + again.factor_seconds;
-  report = again;
-  report.damped = true;
-  report.iterations = iterations;
-  report.factor_seconds = seconds;
+  if (!report.converged || report.residual > s.options.residual) {
+    // From no force on.
+    x = s.candidate;
+    s.clear();
+    s.compliance = s.compliance.cwiseProduct(s.share);
+    s.share.setOnes();
+    const ProjectionReport again = s.iterate(x, Impl::Directions::candidate);
+    const int iterations = report.iterations + again.iterations;
+    const double seconds = report.factor_seconds + again.factor_seconds;
+    report = again;
+    report.damped = true;
+    report.iterations = iterations;
+    report.factor_seconds = seconds;
+  }
+  s.strain_lambda = s.strain_lambda.cwiseQuotient(s.share);
+  forces.strain.row(2) = forces.strain.row(1);
+  forces.strain.row(1) = forces.strain.row(0);
+  forces.strain.row(0) = s.strain_lambda / dt2;
+  forces.place = s.place_lambda / dt2;
   return report;
 }
 

@@ -44,7 +44,7 @@ class LimitLaw {
   bool slack_at(double strain) const { return std::abs(strain) <= band_.slack * limit(strain); }
 
  private:
-  double limit(double sign) const { return sign < 0 ? band_.compress : band_.stretch; }
+  double limit(double sign) const { return std::signbit(sign) ? band_.compress : band_.stretch; }  // of -0.0 too
   double width(double sign) const { return (1 - band_.slack) * limit(sign); }
   StrainBand band_;
   double compliance_;

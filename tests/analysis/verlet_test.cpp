@@ -63,7 +63,10 @@ struct Scene {
         points[0].back().u = u, points[0].back().v = v;
       }
     if (o.limits) rows.strain = strain_rows(model, points, model.lumped_mass());
-    for (StrainRow& row : rows.strain) row.stiffness = o.stiffness * row.area;
+    for (StrainRow& row : rows.strain) {
+      row.stiffness = o.stiffness * row.area;
+      row.damping_rate = 2 * std::sqrt(o.stiffness / o.fabric.density) / o.size;
+    }
     for (const Eigen::Vector2d& uv : o.pins) {
       const Eigen::Vector3d place = rest(uv[0], uv[1]);
       rows.place.push_back({place_row(model, 0, uv[0], uv[1]), 0, [place](double) { return place; }});
@@ -151,7 +154,7 @@ TEST(Verlet, EnergyOfAnUndampedProjectedRunNeverRises) {
         highest = std::max(highest, balance(report) + left_out);
       }
       EXPECT_GT(most_work, 0.5);
-      EXPECT_LT(highest, 2e-6 * most_work) << dt;
+      EXPECT_LT(highest, 1.2e-6 * most_work) << dt;
     }
 }
 
@@ -210,8 +213,31 @@ TEST(Verlet, MovedPinsDoTheWorkThatTheClothTakesUp) {
   }
 }
 
-// Second order in the directions of the constraint forces; what is left is the damping of the limit's own stiffness, of
-// first order and small, and the chatter of the moment law. The paper's variant is 25 mm off at 4 ms.
+// A regularised moment law of little bite (kappa_reg = 1/m): with the sample's 0.03/m it chatters where cloth is nearly
+// flat, which moves the corner by 0.3 mm from one step size to another and hides the order.
+TEST(Verlet, HalvingTheStepMovesTheFreeCornerByLessThanHalfOfTheChangeBefore) {
+  Fabric fabric;
+  fabric.bending.kappa_reg = 1;
+  for (double until : {0.3, 0.6}) {
+    std::vector<Eigen::VectorXd> q;
+    for (double dt : {4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4}) {
+      Scene scene({.fabric = fabric, .fixed = {0, 9}});
+      run(scene, dt, until);
+      q.push_back(scene.places());
+    }
+    double previous = 0;
+    for (std::size_t k = 1; k < q.size(); ++k) {
+      const double change = (q[k] - q[k - 1]).tail<3>().norm();
+      if (k > 1) {
+        EXPECT_LT(change, 0.5 * previous) << "until " << until << ", halving " << k;
+      }
+      previous = change;
+    }
+    EXPECT_LT((q.front() - q.back()).tail<3>().norm(), 5e-4) << until;
+  }
+}
+
+// With the sample's own law: the paper's variant is 25 mm off at 4 ms.
 TEST(Verlet, TheFreeCornerIsWithinHalfAMillimetreAtTheLargestStep) {
   for (double until : {0.3, 0.6}) {
     std::vector<Eigen::Vector3d> corner;
@@ -220,7 +246,7 @@ TEST(Verlet, TheFreeCornerIsWithinHalfAMillimetreAtTheLargestStep) {
       run(scene, dt, until);
       corner.push_back(scene.places().tail<3>());
     }
-    EXPECT_LT((corner[0] - corner[2]).norm(), 6e-4) << until;
+    EXPECT_LT((corner[0] - corner[2]).norm(), 5e-4) << until;
     EXPECT_LT((corner[1] - corner[2]).norm(), 3e-4) << until;
   }
 }
