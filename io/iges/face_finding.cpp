@@ -23,21 +23,20 @@ std::optional<int> nth_integer(const File& file, const Entry& e, int n) {
   return std::nullopt;
 }
 
+// Surfaces that are a face where nobody uses them.
+bool stands_alone(int type) {
+  return type == 114 || type == 118 || type == 120 || type == 122 || type == 128 || type == 140;
+}
+
 // Surfaces that another entity is made of. Groups and properties don't use what they name.
 std::set<int> used_surfaces(const File& file) {
   std::set<int> used;
   std::vector<int> doubtful;  // dependent by their status, though nobody known uses them
   for (const Entry& e : file.entries) {
     int parameter = 0;  // where the pointer to a surface stands
+    if (stands_alone(e.type) && (e.subordinate == 1 || e.subordinate == 3)) doubtful.push_back(e.sequence);
     switch (e.type) {
-      case 114:
-      case 118:
-      case 120:
-      case 122:
-      case 128:
       case 140:
-        if (e.subordinate == 1 || e.subordinate == 3) doubtful.push_back(e.sequence);
-        if (e.type != 140) continue;
         parameter = 5;
         break;
       case 144:
@@ -91,15 +90,11 @@ void expand(Reading& reading, const std::set<int>& used, const Entry& e, const E
   if (depth > max_depth) throw InputError(reading.file.place(e) + "its instances form a cycle");
   if (out.size() > 4 * reading.file.entries.size() + 10000)
     throw InputError(reading.file.place(e) + "its instances are too many");
+  if (stands_alone(e.type)) {
+    if (used.count(e.sequence) == 0 && !endless(reading.file, e)) out.push_back({&e, placement});
+    return;
+  }
   switch (e.type) {
-    case 114:
-    case 118:
-    case 120:
-    case 122:
-    case 128:
-    case 140:
-      if (used.count(e.sequence) != 0 || endless(reading.file, e)) return;
-      [[fallthrough]];
     case 143:
     case 144:
     case 510:

@@ -78,28 +78,32 @@ void warn_of_unread(PanelFile& out) {
     out.warnings.push_back("entity " + std::to_string(type) + ": " + std::to_string(count) + " kept, not read");
 }
 
-}  // namespace
-}  // namespace iges
-
-PanelFile parse_iges(std::string_view text, const std::string& name) {
+PanelFile read_text(std::string text, const std::string& name) {
   PanelFile out;
-  out.file = iges::parse_file(text, name);
-  const iges::Global& g = out.file->global;
+  out.file = parse_file(std::move(text), name);
+  const Global& g = out.file->global;
   out.path = name;
   out.unit = g.unit;
   out.metres_per_unit = g.metres_per_unit;
   out.resolution = g.resolution;
-  out.exporter = iges::exporter(g);
-  for (const iges::Entry& e : out.file->entries) ++out.entities[e.type];
-  iges::Reading reading(*out.file, out.ledger);
-  out.panels = iges::read_panels(reading);
+  out.exporter = exporter(g);
+  for (const Entry& e : out.file->entries) ++out.entities[e.type];
+  Reading reading(*out.file, out.ledger);
+  out.panels = read_panels(reading);
   out.warnings = reading.notes.list();
-  iges::warn_of_unread(out);
+  warn_of_unread(out);
   return out;
 }
 
+}  // namespace
+}  // namespace iges
+
+PanelFile parse_iges(std::string_view text, const std::string& name) {
+  return iges::read_text(std::string(text), name);
+}
+
 PanelFile read_iges(const std::filesystem::path& path) {
-  return parse_iges(read_file(path), path.string());
+  return iges::read_text(read_file(path), path.string());
 }
 
 }  // namespace toile

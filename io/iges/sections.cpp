@@ -63,10 +63,13 @@ template <class Visit>
 void for_each_line(std::string_view text, Visit&& visit) {
   int number = 0;
   std::size_t i = 0;
+  // The next end of each kind, sought once: a file has one kind or both.
+  std::size_t cr = text.find('\r'), lf = text.find('\n');
   while (i < text.size()) {
     if (text[i] == '\x1A') return;
-    std::size_t end = text.find_first_of("\r\n", i);
-    if (end == std::string_view::npos) end = text.size();
+    if (cr < i) cr = text.find('\r', i);
+    if (lf < i) lf = text.find('\n', i);
+    const std::size_t end = std::min({cr, lf, text.size()});
     std::string_view line = text.substr(i, end - i);
     while (line.size() > 80 + section_column && is_section(line[section_column]) &&
            is_section(line[80 + section_column])) {
@@ -207,8 +210,9 @@ void resolve_records(File& file) {
   const auto& lines = file.parameter_lines;
   const int total = static_cast<int>(lines.size());
   auto owner = [&](int i) { return lines[static_cast<std::size_t>(i)].owner; };
-  std::map<int, int> first_of_owner;
-  for (int i = total - 1; i >= 0; --i) first_of_owner[owner(i)] = i;
+  std::vector<int> first_of_owner(file.entries.size(), -1);  // by entry
+  for (int i = total - 1; i >= 0; --i)
+    if (const Entry* e = file.find(owner(i))) first_of_owner[static_cast<std::size_t>(e - file.entries.data())] = i;
   std::set<int> anonymous_starts;
   auto anonymous = [&](int i) { return file.find(owner(i)) == nullptr; };
   for (const Entry& entry : file.entries)
@@ -217,8 +221,8 @@ void resolve_records(File& file) {
     const int pointer = entry.first - 1;
     const int claimed = entry.count;
     entry.first = entry.count = 0;
-    if (const auto own = first_of_owner.find(entry.sequence); own != first_of_owner.end()) {
-      entry.first = own->second;
+    if (const int own = first_of_owner[static_cast<std::size_t>((entry.sequence - 1) / 2)]; own >= 0) {
+      entry.first = own;
       int end = entry.first;
       while (end < total && owner(end) == entry.sequence) ++end;
       entry.count = end - entry.first;
@@ -273,12 +277,12 @@ std::string File::place(const Entry& entry, int line) const {
   return name + ":" + std::to_string(line > 0 ? line : entry.line) + ": entity " + std::to_string(entry.type) + ": ";
 }
 
-std::shared_ptr<const File> parse_file(std::string_view text, const std::string& name) {
+std::shared_ptr<const File> parse_file(std::string text, const std::string& name) {
   auto result = std::make_shared<File>();
   File& file = *result;
   file.name = name;
-  file.text = text;
-  if (trim(text).empty()) throw InputError(name + ": the file is empty, must be IGES");
+  file.text = std::move(text);
+  if (trim(file.text).empty()) throw InputError(name + ": the file is empty, must be IGES");
 
   std::string global;
   struct Card {
@@ -289,7 +293,7 @@ std::shared_ptr<const File> parse_file(std::string_view text, const std::string&
   std::string_view terminate;
   int sections = 0, last_line = 0, global_lines = 0;
   std::array<int, 4> counts{};  // S, G, D, P
-  file.parameters.reserve(text.size());
+  file.parameters.reserve(file.text.size());
   auto note = [&](const std::string& kind, int line, const std::string& what) {
     file.notes.add(kind, name + ":" + std::to_string(line) + ": " + what);
   };
