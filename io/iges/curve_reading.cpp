@@ -12,6 +12,16 @@ namespace {
 
 NaturalCurve natural_curve(Reading& reading, const Entry& e, int depth);
 
+// The curves of a composite; points (116, 132) may mark its joints. [IGES 5.3, 4.4]
+std::vector<const Entry*> parts_of(Reading& reading, const Entry& e, Parameters& in) {
+  std::vector<const Entry*> out;
+  for (const int sequence : read_composite(in)) {
+    const Entry& part = reading.entry(sequence, e, "curve");
+    if (part.type != 116 && part.type != 132) out.push_back(&part);
+  }
+  return out;
+}
+
 Curve3 offset_curve(Reading& reading, const Entry& e, int depth) {
   Parameters in(reading.file, e, &reading.notes);
   const OffsetCurve record = read_offset_curve(in);
@@ -29,7 +39,7 @@ void append_curves(Reading& reading, const Entry& e, std::vector<Curve3>& out, i
   reading.spend(e);
   if (e.type == 102) {
     Parameters in(reading.file, e, &reading.notes);
-    for (int sequence : read_composite(in)) append_curves(reading, reading.entry(sequence, e, "curve"), out, depth + 1);
+    for (const Entry* part : parts_of(reading, e, in)) append_curves(reading, *part, out, depth + 1);
     // Shared curves inside shared composites could multiply without end.
     if (out.size() > 4 * reading.file.entries.size() + 16)
       throw InputError(reading.file.place(e) + "it repeats its curves too often");
@@ -65,8 +75,8 @@ NaturalCurve natural_curve(Reading& reading, const Entry& e, int depth) {
     reading.spend(e);
     Parameters in(reading.file, e, &reading.notes);
     std::vector<NaturalCurve> pieces;
-    for (int sequence : read_composite(in)) {
-      pieces.push_back(natural_curve(reading, reading.entry(sequence, e, "curve"), depth + 1));
+    for (const Entry* part : parts_of(reading, e, in)) {
+      pieces.push_back(natural_curve(reading, *part, depth + 1));
       if (pieces.size() > 4 * reading.file.entries.size() + 16)
         throw InputError(reading.file.place(e) + "it repeats its curves too often");
     }

@@ -24,8 +24,9 @@ std::optional<int> nth_integer(const File& file, const Entry& e, int n) {
 }
 
 // Surfaces that are a face where nobody uses them.
-bool stands_alone(int type) {
-  return type == 114 || type == 118 || type == 120 || type == 122 || type == 128 || type == 140;
+bool stands_alone(const Entry& e) {
+  return e.type == 114 || e.type == 118 || e.type == 120 || e.type == 122 || e.type == 128 || e.type == 140 ||
+         (e.type == 108 && e.form == 1);
 }
 
 // Surfaces that another entity is made of. Groups and properties don't use what they name.
@@ -34,7 +35,7 @@ std::set<int> used_surfaces(const File& file) {
   std::vector<int> doubtful;  // dependent by their status, though nobody known uses them
   for (const Entry& e : file.entries) {
     int parameter = 0;  // where the pointer to a surface stands
-    if (stands_alone(e.type) && (e.subordinate == 1 || e.subordinate == 3)) doubtful.push_back(e.sequence);
+    if (stands_alone(e) && (e.subordinate == 1 || e.subordinate == 3)) doubtful.push_back(e.sequence);
     switch (e.type) {
       case 140:
         parameter = 5;
@@ -72,6 +73,7 @@ std::set<int> used_surfaces(const File& file) {
 
 // An offset of a plane, a cylinder or a cone has no end of its own.
 bool endless(const File& file, const Entry& e) {
+  if (e.type != 140) return false;
   const Entry* base = &e;
   for (int depth = 0; base && base->type == 140 && depth <= max_depth; ++depth)
     base = file.find(nth_integer(file, *base, 5).value_or(0));
@@ -90,7 +92,7 @@ void expand(Reading& reading, const std::set<int>& used, const Entry& e, const E
   if (depth > max_depth) throw InputError(reading.file.place(e) + "its instances form a cycle");
   if (out.size() > 4 * reading.file.entries.size() + 10000)
     throw InputError(reading.file.place(e) + "its instances are too many");
-  if (stands_alone(e.type)) {
+  if (stands_alone(e)) {
     if (used.count(e.sequence) == 0 && !endless(reading.file, e)) out.push_back({&e, placement});
     return;
   }

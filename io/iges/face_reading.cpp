@@ -1,9 +1,13 @@
 #include "io/iges/face_reading.h"
 
+#include <algorithm>
+
 #include "geometry/error.h"
 #include "io/iges/boundary_reading.h"
+#include "io/iges/curve_reading.h"
 #include "io/iges/entity.h"
 #include "io/iges/surface_reading.h"
+#include "io/iges/surfaces.h"
 #include "io/iges/topology.h"
 
 namespace toile::iges {
@@ -45,6 +49,9 @@ FaceRecord record_of(Reading& reading, const Entry& e) {
     out.loops = std::move(face.loops);
     out.has_outer = face.outer_first;
     out.loop_type = 508;
+  } else if (e.type == 108) {
+    out.loops = {read_plane(in).boundary};
+    out.has_outer = true;
   } else {
     return out;
   }
@@ -55,12 +62,22 @@ FaceRecord record_of(Reading& reading, const Entry& e) {
 // 141 and 142 stand for each other, with a warning.
 const Entry& boundary_entry(Reading& reading, const Entry& e, const FaceRecord& face, int sequence, const char* role) {
   const Entry& found = reading.entry(sequence, e, role);
+  if (face.loop_type == 0) return found;
   const int other = face.loop_type == 141 ? 142 : face.loop_type == 142 ? 141 : 0;
   if (other == 0 || found.type != other) return reading.entry(sequence, e, role, face.loop_type);
   reading.note(e, std::to_string(other) + " in " + std::to_string(e.type),
                "its boundary is an entity " + std::to_string(other) + ", must be " + std::to_string(face.loop_type) +
                    "; it is read as one");
   return found;
+}
+
+// The closed curve that bounds a plane 108 of form 1, in the plane's own space.
+BoundaryCurves plane_boundary(Reading& reading, const Entry& plane, const Entry& curve) {
+  BoundaryCurves out;
+  out.place = reading.file.place(plane);
+  const Eigen::Affine3d t = reading.transform(plane);
+  for (const Curve3& c : curves_of(reading, curve.sequence, plane, "boundary")) out.model.push_back(transformed(t, c));
+  return out;
 }
 
 }  // namespace
@@ -70,9 +87,18 @@ std::vector<TrimmedSurface> panels_of(Reading& reading, const Entry& e) {
   std::vector<BoundaryCurves> boundaries;
   std::vector<const Entry*> entries;
   for (std::size_t i = 0; i < record.loops.size(); ++i) {
+    const auto before = record.loops.begin() + static_cast<std::ptrdiff_t>(i);
+    if (record.loops[i] == 0 || std::find(record.loops.begin(), before, record.loops[i]) != before) {
+      reading.note(e, "idle boundary",
+                   record.loops[i] == 0
+                       ? "a pointer to a boundary is 0; it is passed over"
+                       : "boundary " + std::to_string(record.loops[i]) + " is named twice; once counts");
+      continue;
+    }
     const char* role = i == 0 && record.has_outer ? "outer boundary" : "boundary";
     const Entry& from = boundary_entry(reading, e, record, record.loops[i], role);
-    BoundaryCurves curves = boundary_of(reading, from, record.surface);
+    BoundaryCurves curves =
+        e.type == 108 ? plane_boundary(reading, e, from) : boundary_of(reading, from, record.surface);
     // A loop that is one vertex bounds nothing: a whole sphere.
     if (curves.model.empty() && curves.parameter.empty()) continue;
     boundaries.push_back(std::move(curves));

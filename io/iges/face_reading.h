@@ -1,4 +1,4 @@
-// Faces: 144, 143, 510, and surfaces that bound themselves.
+// Faces: 144, 143, 510, bounded planes (108 form 1), and surfaces that bound themselves.
 #pragma once
 
 #include <vector>
