@@ -86,6 +86,33 @@ void add_green(const BoundaryBezier& piece, Real t0, Real t1, int n, int degree_
   }
 }
 
+// The same of a piece along x = const, in closed form: the integral of P_b is (P_{b+1} - P_{b-1}) / (2b + 1).
+void add_upright(const BoundaryBezier& piece, int degree_x, int degree_y, Real* sums) {
+  const Real x = piece.x[0];
+  std::array<Real, 64> antiderivative;
+  Real before = 1, value = x;
+  antiderivative[0] = x;
+  for (int a = 1; a <= degree_x; ++a) {
+    const Real next = ((2 * a + 1) * x * value - a * before) / (a + 1);
+    antiderivative[a] = (next - before) / (2 * a + 1);
+    before = value;
+    value = next;
+  }
+  const Real y0 = piece.y[0], y1 = piece.y[1];
+  Real before0 = 1, value0 = y0, before1 = 1, value1 = y1;  // P_{b-1}, P_b at both ends, from b = 1
+  for (int a = 0; a <= degree_x; ++a) sums[a] += antiderivative[a] * (y1 - y0);
+  for (int b = 1; b <= degree_y; ++b) {
+    const Real next0 = ((2 * b + 1) * y0 * value0 - b * before0) / (b + 1);
+    const Real next1 = ((2 * b + 1) * y1 * value1 - b * before1) / (b + 1);
+    const Real integral = ((next1 - before1) - (next0 - before0)) / (2 * b + 1);
+    for (int a = 0; a <= degree_x; ++a) sums[a + (degree_x + 1) * b] += antiderivative[a] * integral;
+    before0 = value0;
+    value0 = next0;
+    before1 = value1;
+    value1 = next1;
+  }
+}
+
 // Halves a piece until Gauss on it and on its halves agree to rounding.
 void add_green_adaptively(const BoundaryBezier& piece, Real t0, Real t1, int n, int degree_x, int degree_y, int depth,
                           std::span<const Real> whole, std::span<Real> sums) {
@@ -213,6 +240,10 @@ void legendre_moments(std::span<const BoundaryBezier> pieces, int degree_x, int 
   for (const BoundaryBezier& piece : pieces) {
     const int d = piece.degree;
     if (d == 1 && piece.y[0] == piece.y[1] && !piece.rational) continue;
+    if (d == 1 && piece.x[0] == piece.x[1] && !piece.rational) {
+      add_upright(piece, degree_x, degree_y, moments.data());
+      continue;
+    }
     // The integrand has degree d (degree_x + degree_y + 2) - 1 in t.
     const int exact = (d * (degree_x + degree_y + 2) + 1) / 2;
     if (!piece.rational && exact <= max_gauss_points) {

@@ -19,7 +19,9 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double believable = 1e-2;  // of the surface's size: model curves further off it bound something else
-constexpr double usable = 1e-3;      // of the domain; gaps and excursions beyond it are refused by validation
+constexpr const char* out_of_order =
+    "its curves don't follow each other in the file's order; they are sorted by their ends";
+constexpr double usable = 1e-3;  // of the domain; gaps and excursions beyond it are refused by validation
 
 Vector2d first(const TrimCurve& c) {
   return c.reversed ? c.curve.end() : c.curve.start();
@@ -71,6 +73,35 @@ bool contains(const std::vector<Vector2d>& p, const Vector2d& x) {
         x.x() < (p[j].x() - p[i].x()) * (x.y() - p[i].y()) / (p[j].y() - p[i].y()) + p[i].x())
       in = !in;
   return in;
+}
+
+// The order in which curves, given by their ends, follow each other from the first one on, each running either way.
+// Empty where that is the order they have, or where they don't close within `reach`.
+template <class Point>
+std::vector<std::size_t> order_by_ends(const std::vector<std::array<Point, 2>>& ends, double reach) {
+  const std::size_t n = ends.size();
+  if (n < 3 || n > 1000) return {};
+  std::vector<std::size_t> order{0};
+  std::vector<bool> taken(n, false);
+  Point at = ends[0][1];
+  while (order.size() < n) {
+    taken[order.back()] = true;
+    std::size_t best = 0;
+    int side = 0;
+    double least = reach;
+    for (std::size_t i = 0; i < n; ++i)
+      for (int k = 0; k < 2; ++k)
+        if (const double d = (ends[i][static_cast<std::size_t>(k)] - at).norm(); !taken[i] && d <= least) {
+          least = d;
+          best = i;
+          side = k;
+        }
+    if (best == 0) return {};
+    order.push_back(best);
+    at = ends[best][static_cast<std::size_t>(1 - side)];
+  }
+  if ((at - ends[0][0]).norm() > reach || std::ranges::is_sorted(order)) return {};
+  return order;
 }
 
 class FaceMaker {
@@ -275,8 +306,50 @@ class FaceMaker {
       b.converted = "parameter curves carried along with the surface" +
                     (error > 0 ? ", off by " + format_real(error) + " in its parameters" : std::string(", exactly"));
     std::vector<TrimCurve> out = numbered(std::move(flat));
+    std::vector<std::array<Vector2d, 2>> ends;
+    const Vector2d lengths(domain_[0].length(), domain_[1].length());
+    for (const TrimCurve& c : out)
+      ends.push_back({c.curve.start().cwiseQuotient(lengths), c.curve.end().cwiseQuotient(lengths)});
+    if (std::vector<TrimCurve> whole = along_seam(out); !whole.empty()) {
+      note(b, "along the seam", "the loop is the seam there and back; it is closed along the surface's ends");
+      b.converted = "loop of a seam closed along the surface's ends";
+      return whole;
+    }
     chain(out);
+    if (fit_of(out).gap <= usable) return out;
+    if (const std::vector<std::size_t> order = order_by_ends(ends, usable); !order.empty()) {
+      std::vector<TrimCurve> sorted;
+      for (const std::size_t i : order) sorted.push_back(std::move(out[i]));
+      for (TrimCurve& c : sorted) c.reversed = false;
+      chain(sorted);
+      note(b, "order", out_of_order);
+      return sorted;
+    }
     return out;
+  }
+
+  // A loop that is the seam of a closed surface, there and back on its two sides, bounds all between its ends.
+  std::vector<TrimCurve> along_seam(const std::vector<TrimCurve>& curves) const {
+    if (curves.size() != 2) return {};
+    for (int k = 0; k < 2; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const auto lies_on = [&](const TrimCurve& c, double line) {
+        return (c.curve.points().row(k).array() - line).abs().maxCoeff() <= 1e-9 * period_[i];
+      };
+      const auto &a = curves[0], &b = curves[1];
+      if (!closed_[i] || !((lies_on(a, domain_[i].min) && lies_on(b, domain_[i].max)) ||
+                           (lies_on(a, domain_[i].max) && lies_on(b, domain_[i].min))))
+        continue;
+      std::vector<TrimCurve> out{a, leg(last(a), last(b), 2), b, leg(first(b), first(a), 3)};
+      if ((last(a) - first(b)).norm() < (last(a) - last(b)).norm()) {
+        out[1] = leg(last(a), first(b), 2);
+        out[3] = leg(last(b), first(a), 3);
+      } else {
+        out[2].reversed = true;
+      }
+      return out;
+    }
+    return {};
   }
 
   // Model curves head to tail: each may run either way.
@@ -297,7 +370,18 @@ class FaceMaker {
     std::vector<TrimCurve> curves;
     double error = 0, distance = 0;
     Vector3d place{0, 0, 0};
+    bool sorted = false;
   };
+
+  bool follow_each_other(const std::vector<std::array<Vector3d, 2>>& ends) const {
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      const auto &a = ends[i], &b = ends[(i + 1) % ends.size()];
+      if (std::min(std::min((a[0] - b[0]).norm(), (a[0] - b[1]).norm()),
+                   std::min((a[1] - b[0]).norm(), (a[1] - b[1]).norm())) > usable * size_)
+        return false;
+    }
+    return true;
+  }
 
   // The joint of two pulled curves: a coordinate that one of them keeps all along is the better one.
   static void meet(TrimCurve& a, TrimCurve& b) {
@@ -311,8 +395,14 @@ class FaceMaker {
     b.curve = Curve2(b.curve.knots(), std::move(q), b.curve.weights());
   }
 
-  Pulled pulled(std::vector<Curve3> model, std::optional<Vector2d> start) const {
+  Pulled pulled(const BoundaryCurves& boundary, std::optional<Vector2d> start) const {
     Pulled out;
+    std::vector<Curve3> model = boundary.model;
+    std::vector<std::array<Vector3d, 2>> ends;
+    for (const Curve3& m : model) ends.push_back({m.start(), m.end()});
+    const std::vector<std::size_t> order =
+        follow_each_other(ends) ? std::vector<std::size_t>{} : order_by_ends(ends, usable * size_);
+    for (std::size_t i = 0; i < order.size(); ++i) model[i] = boundary.model[order[i]];
     chain(model);
     const std::optional<AffinePatch> patch = file_.plane ? std::nullopt : affine_patch(s_, 1e-9 * size_);
     Eigen::Matrix<double, 2, 3> inverse;
@@ -355,6 +445,8 @@ class FaceMaker {
     }
     out.curves = numbered(std::move(flat));
     for (std::size_t i = 0; i < model.size(); ++i) out.curves[i].model = model[i];
+    for (std::size_t i = 0; i < order.size(); ++i) out.curves[i].index = static_cast<int>(order[i]);
+    out.sorted = !order.empty();
     chain(out.curves);
     const std::size_t n = out.curves.size();
     for (std::size_t i = 0; i < n && !(n == 1 && out.curves[0].curve.points().cols() < 3); ++i) {
@@ -367,8 +459,8 @@ class FaceMaker {
   }
 
   // A start on a seam may mean either side of it: the side from which the loop closes is meant.
-  Pulled pulled(const std::vector<Curve3>& model) const {
-    Pulled best = pulled(model, std::nullopt);
+  Pulled pulled(const BoundaryCurves& b) const {
+    Pulled best = pulled(b, std::nullopt);
     const auto open = [&](const Pulled& p) { return (first(p.curves.front()) - last(p.curves.back())).norm(); };
     if (!(closed_[0] || closed_[1]) || best.curves.empty()) return best;
     for (int k = 0; k < 2; ++k) {
@@ -379,7 +471,7 @@ class FaceMaker {
         continue;
       Vector2d other = first(best.curves.front());
       other[k] = start == domain_[i].min ? domain_[i].max : domain_[i].min;
-      Pulled again = pulled(model, other);
+      Pulled again = pulled(b, other);
       if (open(again) < open(best)) best = std::move(again);
     }
     return best;
@@ -408,7 +500,7 @@ class FaceMaker {
       }
     }
     if (own.size() == b.model.size())
-      for (std::size_t i = 0; i < own.size(); ++i) own[i].model = b.model[i];
+      for (TrimCurve& c : own) c.model = b.model[static_cast<std::size_t>(c.index)];
     if (trouble.empty()) return own;
     if (b.model.empty()) {
       if (own.empty()) fail(b, "it has neither parameter curves nor model curves");
@@ -417,7 +509,7 @@ class FaceMaker {
     }
     std::string why;
     try {
-      Pulled p = pulled(b.model);
+      Pulled p = pulled(b);
       const Fit fit = fit_of(p.curves);
       // Where neither is good the file's parameter curves stay, for validation to say where they fail.
       const Fit old = own.empty() ? Fit{1, 1} : fit_of(own);
@@ -433,6 +525,7 @@ class FaceMaker {
         b.converted = "parameter curves pulled back from the model curves, " +
                       (p.error > 0 ? "off by " + format_real(p.error) : std::string("exactly")) +
                       ", the model curves lying " + format_real(p.distance) + " off the surface";
+        if (p.sorted) note(b, "order", out_of_order);
         return std::move(p.curves);
       }
       why = "its model curves lie " + format_real(p.distance) + " off the surface at (" + format_real(p.place.x()) +

@@ -91,7 +91,7 @@ struct File {
 // Splits bytes into sections: any line ends or none, misaligned columns, lines after T, control-Z, wrong counts.
 // Throws InputError where there is no directory to speak of, or where the file was cut off before its last record
 // ended.
-std::shared_ptr<const File> parse_file(std::string_view text, const std::string& name);
+std::shared_ptr<const File> parse_file(std::string text, const std::string& name);
 
 // Length units by flag (1 to 11) or by name.
 struct Unit {

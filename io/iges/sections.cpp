@@ -39,23 +39,42 @@ struct Line {
   std::string_view data;  // what stands before the section letter
   char section = 0;       // 0: none found
   bool aligned = true;
+  int number = 0;  // what stands behind it; 0: nothing readable
 };
+
+char upper(char c) {
+  return 'a' <= c && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+}
+
+bool ends_number(std::string_view line, std::size_t at) {
+  return at + 1 < line.size() && is_digit(line[at]) && !is_digit(line[at + 1]);
+}
 
 Line classify(std::string_view line) {
   while (!line.empty() && is_blank(line.back())) line.remove_suffix(1);
-  if (line.size() > section_column && is_section(line[section_column])) {
+  const char letter = line.size() > section_column ? upper(line[section_column]) : ' ';
+  if (is_section(letter)) {
     const std::string_view number = line.substr(section_column + 1, 7);
     if (std::all_of(number.begin(), number.end(), [](char c) { return is_digit(c) || c == ' '; }))
-      return {line.substr(0, section_column), line[section_column], true};
+      return {line.substr(0, section_column), letter, true, parse_integer(number).value_or(0)};
   }
   // Elsewhere: a letter followed by up to seven digits (blank-padded) at the end of the line.
   std::size_t i = line.size();
   while (i > 0 && is_digit(line[i - 1])) --i;
-  const bool numbered = i < line.size();
+  const std::string_view number = line.substr(i);
   while (i > 0 && line[i - 1] == ' ' && line.size() - i < 7) --i;
-  if (numbered && i > 0 && is_section(line[i - 1]) && line.size() - i <= 7)
-    return {line.substr(0, i - 1), line[i - 1], false};
-  return {line, 0, false};
+  if (!number.empty() && i > 0 && is_section(line[i - 1]) && line.size() - i <= 7) {
+    const std::size_t shift = i - 1 > section_column ? i - 1 - section_column : 0;
+    std::string_view data = line.substr(0, i - 1);
+    // The whole line stands further right: then the first field of a directory line, a number, ends there too.
+    if (line[i - 1] == 'D' && shift <= 8 && trim(data.substr(0, shift)).empty() && !ends_number(data, 7) &&
+        ends_number(data, 7 + shift))
+      data.remove_prefix(shift);
+    return {data, line[i - 1], false, parse_integer(number).value_or(0)};
+  }
+  // The letter stands where it should, with anything but a number behind it.
+  if (is_section(letter) && line.size() <= 80) return {line.substr(0, section_column), letter, true, 0};
+  return {line, 0, false, 0};
 }
 
 // Calls visit(line, number) for every line: ended by CR, LF or both, or 80 columns each where there are no line ends.
@@ -63,10 +82,13 @@ template <class Visit>
 void for_each_line(std::string_view text, Visit&& visit) {
   int number = 0;
   std::size_t i = 0;
+  // The next end of each kind, sought once: a file has one kind or both.
+  std::size_t cr = text.find('\r'), lf = text.find('\n');
   while (i < text.size()) {
     if (text[i] == '\x1A') return;
-    std::size_t end = text.find_first_of("\r\n", i);
-    if (end == std::string_view::npos) end = text.size();
+    if (cr < i) cr = text.find('\r', i);
+    if (lf < i) lf = text.find('\n', i);
+    const std::size_t end = std::min({cr, lf, text.size()});
     std::string_view line = text.substr(i, end - i);
     while (line.size() > 80 + section_column && is_section(line[section_column]) &&
            is_section(line[80 + section_column])) {
@@ -107,6 +129,31 @@ Entry read_entry(std::string_view first, std::string_view second, int line, int 
   const std::string_view subscript = field(second, 8);
   if (!entry.label.empty() && !subscript.empty() && subscript != "0") entry.label += subscript;
   return entry;
+}
+
+// A string with a wrong count may swallow the next fields or fall in two. The unit's flag and name tell by how much the
+// fields are shifted; blanks before the scale, or one field less, put them right. False: nothing to do.
+bool align_fields(Global& g) {
+  constexpr std::size_t flag =
+      14 - 3;  // the standard's number of the unit's flag; its name follows, the scale precedes
+  const auto names_unit = [&](std::size_t k) {
+    return k + 1 < g.fields.size() && unit_of_flag(parse_integer(g.fields[k]).value_or(0)) && g.is_text[k + 1] &&
+           unit_of_name(g.fields[k + 1]);
+  };
+  if (names_unit(flag) || (flag + 1 < g.fields.size() && unit_of_name(g.fields[flag + 1]))) return false;
+  for (std::size_t k = flag - 4; k <= flag + 4; ++k) {
+    if (!names_unit(k)) continue;
+    const auto scale = static_cast<std::ptrdiff_t>(std::min(k, flag)) - 1;
+    if (k < flag) {
+      g.fields.insert(g.fields.begin() + scale, flag - k, std::string());
+      g.is_text.insert(g.is_text.begin() + scale, flag - k, false);
+    } else {
+      g.fields.erase(g.fields.begin() + scale, g.fields.begin() + static_cast<std::ptrdiff_t>(k) - 1);
+      g.is_text.erase(g.is_text.begin() + scale, g.is_text.begin() + static_cast<std::ptrdiff_t>(k) - 1);
+    }
+    return true;
+  }
+  return false;
 }
 
 void read_global(File& file, std::string_view text) {
@@ -158,6 +205,7 @@ void read_global(File& file, std::string_view text) {
   auto note = [&](const std::string& what) {
     file.notes.add(what, file.name + ":" + std::to_string(file.global_line) + ": global section: " + what);
   };
+  if (align_fields(g)) note("a string has a wrong count; the unit's name shows by how much the fields are shifted");
   g.product = at(3);
   g.system = at(5);
   g.preprocessor = at(6);
@@ -200,15 +248,40 @@ void read_global(File& file, std::string_view text) {
   }
 }
 
+// Whether a parameter line begins a record of this type.
+bool begins_record(const File& file, int line, int type) {
+  if (line < 0 || line >= static_cast<int>(file.parameter_lines.size())) return false;
+  const std::string_view text =
+      std::string_view(file.parameters).substr(file.parameter_lines[static_cast<std::size_t>(line)].begin, 64);
+  return parse_integer(
+             text.substr(0, text.find_first_of(std::string{file.delimiters.parameter, file.delimiters.record})))
+             .value_or(-1) == type;
+}
+
 // Parameter lines of every entry: from its pointer as long as the lines carry its number; where the pointer leads
-// elsewhere, the first line that carries its number; where lines carry no number of an entry, as many as the directory
-// says, up to the next entry's. No line belongs to two entries.
+// elsewhere, the first line that carries its number; where lines carry no number of an entry, up to the next entry's.
+// No line belongs to two entries. Where more of the pointers lead to a record of the right type than of the numbers on
+// the lines, no number on a line counts.
 void resolve_records(File& file) {
-  const auto& lines = file.parameter_lines;
+  auto& lines = file.parameter_lines;
   const int total = static_cast<int>(lines.size());
   auto owner = [&](int i) { return lines[static_cast<std::size_t>(i)].owner; };
-  std::map<int, int> first_of_owner;
-  for (int i = total - 1; i >= 0; --i) first_of_owner[owner(i)] = i;
+  std::vector<int> first_of_owner(file.entries.size(), -1);  // by entry
+  for (int i = total - 1; i >= 0; --i)
+    if (const Entry* e = file.find(owner(i))) first_of_owner[static_cast<std::size_t>(e - file.entries.data())] = i;
+  std::size_t by_pointer = 0, by_number = 0;
+  for (std::size_t k = 0; k < file.entries.size(); ++k) {
+    by_pointer += begins_record(file, file.entries[k].first - 1, file.entries[k].type) ? 1 : 0;
+    by_number += begins_record(file, first_of_owner[k], file.entries[k].type) ? 1 : 0;
+  }
+  if (by_pointer > by_number) {
+    if (by_number > 0 || std::ranges::any_of(first_of_owner, [](int i) { return i >= 0; }))
+      file.notes.add("owners", file.name + ":" + std::to_string(lines.front().line) +
+                                   ": the directory numbers on the parameter lines are wrong; the directory's "
+                                   "pointers are taken");
+    for (ParameterLine& line : lines) line.owner = 0;
+    std::ranges::fill(first_of_owner, -1);
+  }
   std::set<int> anonymous_starts;
   auto anonymous = [&](int i) { return file.find(owner(i)) == nullptr; };
   for (const Entry& entry : file.entries)
@@ -217,8 +290,8 @@ void resolve_records(File& file) {
     const int pointer = entry.first - 1;
     const int claimed = entry.count;
     entry.first = entry.count = 0;
-    if (const auto own = first_of_owner.find(entry.sequence); own != first_of_owner.end()) {
-      entry.first = own->second;
+    if (const int own = first_of_owner[static_cast<std::size_t>((entry.sequence - 1) / 2)]; own >= 0) {
+      entry.first = own;
       int end = entry.first;
       while (end < total && owner(end) == entry.sequence) ++end;
       entry.count = end - entry.first;
@@ -231,13 +304,53 @@ void resolve_records(File& file) {
       const int limit = next == anonymous_starts.end() ? total : *next;
       entry.first = pointer;
       int end = pointer;
-      while (end < limit && anonymous(end) && end - pointer < std::max(1, claimed)) ++end;
+      while (end < limit && anonymous(end)) ++end;
       entry.count = end - pointer;
     }
     if (entry.count > 0 && entry.count != claimed)
       file.notes.add("line count", file.place(entry) + "claims " + std::to_string(claimed) + " parameter lines, has " +
                                        std::to_string(entry.count));
   }
+}
+
+struct DirectoryCard {
+  std::string_view data;
+  int line, number;
+};
+
+// Entries by position. Where entries were cut out of a file, what is left keeps its numbers, and pointers go by them:
+// if the parameter lines carry numbers beyond the positions and only such as stand in the directory, the gaps are
+// filled with null entities.
+void read_directory(File& file, const std::vector<DirectoryCard>& cards) {
+  const std::size_t count = cards.size() / 2;
+  std::set<int> numbers;
+  bool ordered = true;
+  for (std::size_t k = 0; k < count; ++k) {
+    const int n = cards[2 * k].number;
+    ordered = ordered && n % 2 == 1 && (numbers.empty() || n > *numbers.rbegin());
+    numbers.insert(n);
+  }
+  const int last = static_cast<int>(2 * count) - 1;
+  bool beyond = false, known = true;
+  for (const ParameterLine& line : file.parameter_lines) {
+    beyond = beyond || line.owner > last;
+    known = known && numbers.count(line.owner) != 0;
+  }
+  const bool gaps = ordered && beyond && known && *numbers.rbegin() / 2 < static_cast<int>(4 * count + 1000);
+  file.entries.reserve(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    auto sequence = [&] { return static_cast<int>(2 * file.entries.size()) + 1; };
+    while (gaps && sequence() < cards[2 * k].number) {
+      Entry& null = file.entries.emplace_back();
+      null.sequence = sequence() - 2;
+      null.line = cards[2 * k].line;
+    }
+    const int number = sequence();
+    file.entries.push_back(read_entry(cards[2 * k].data, cards[2 * k + 1].data, cards[2 * k].line, number));
+  }
+  if (gaps)
+    file.notes.add("directory gaps", file.name + ":" + std::to_string(cards.front().line) +
+                                         ": the directory's numbers have gaps; null entities fill them");
 }
 
 }  // namespace
@@ -273,23 +386,19 @@ std::string File::place(const Entry& entry, int line) const {
   return name + ":" + std::to_string(line > 0 ? line : entry.line) + ": entity " + std::to_string(entry.type) + ": ";
 }
 
-std::shared_ptr<const File> parse_file(std::string_view text, const std::string& name) {
+std::shared_ptr<const File> parse_file(std::string text, const std::string& name) {
   auto result = std::make_shared<File>();
   File& file = *result;
   file.name = name;
-  file.text = text;
-  if (trim(text).empty()) throw InputError(name + ": the file is empty, must be IGES");
+  file.text = std::move(text);
+  if (trim(file.text).empty()) throw InputError(name + ": the file is empty, must be IGES");
 
   std::string global;
-  struct Card {
-    std::string_view data;
-    int line;
-  };
-  std::vector<Card> directory;
+  std::vector<DirectoryCard> directory;
   std::string_view terminate;
   int sections = 0, last_line = 0, global_lines = 0;
   std::array<int, 4> counts{};  // S, G, D, P
-  file.parameters.reserve(text.size());
+  file.parameters.reserve(file.text.size());
   auto note = [&](const std::string& kind, int line, const std::string& what) {
     file.notes.add(kind, name + ":" + std::to_string(line) + ": " + what);
   };
@@ -312,7 +421,12 @@ std::shared_ptr<const File> parse_file(std::string_view text, const std::string&
       return true;
     }
     ++sections;
-    if (!line.aligned) note("misaligned", number, "the section letter does not stand in column 73");
+    if (!line.aligned) {
+      note("misaligned", number, "the section letter does not stand in column 73");
+    } else if (raw[section_column] != line.section) {
+      note("lower case", number, "the section letter is lower case");
+    }
+    if (line.number == 0) note("no number", number, "no sequence number behind the section letter");
     switch (line.section) {
       case 'S':
         ++counts[0];
@@ -326,7 +440,7 @@ std::shared_ptr<const File> parse_file(std::string_view text, const std::string&
         break;
       case 'D':
         ++counts[2];
-        directory.push_back({line.data, number});
+        directory.push_back({line.data, number, line.number});
         break;
       case 'P': {
         ++counts[3];
@@ -357,10 +471,7 @@ std::shared_ptr<const File> parse_file(std::string_view text, const std::string&
   read_global(file, global);
   if (directory.empty())
     throw InputError(name + ":" + std::to_string(last_line) + ": the directory section is missing");
-  file.entries.reserve(directory.size() / 2);
-  for (std::size_t i = 0; i + 1 < directory.size(); i += 2)
-    file.entries.push_back(
-        read_entry(directory[i].data, directory[i + 1].data, directory[i].line, static_cast<int>(i) + 1));
+  read_directory(file, directory);
   if (directory.size() % 2 != 0) {
     if (!file.terminated)
       throw InputError(name + ":" + std::to_string(last_line) + ": the file ends in its directory section");
@@ -411,15 +522,28 @@ std::optional<Unit> unit_of_flag(int flag) {
 }
 
 std::optional<Unit> unit_of_name(std::string_view name) {
-  std::string upper;
-  for (char c : trim(name)) upper += 'a' <= c && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-  if (upper == "IN" || upper == "INCHES") upper = "INCH";
-  if (upper == "MILLIMETER" || upper == "MILLIMETERS" || upper == "MILLIMETRE" || upper == "MILLIMETRES") upper = "MM";
-  if (upper == "CENTIMETER" || upper == "CENTIMETERS" || upper == "CENTIMETRE" || upper == "CENTIMETRES") upper = "CM";
-  if (upper == "METER" || upper == "METERS" || upper == "METRE" || upper == "METRES") upper = "M";
-  if (upper == "FOOT" || upper == "FEET") upper = "FT";
+  std::string word;
+  for (char c : trim(name)) word += upper(c);
+  if (word.size() > 3 && word.back() == 'S') word.pop_back();
+  if (word.size() > 3 && word.ends_with("TRE")) word.replace(word.size() - 2, 2, "ER");
+  constexpr std::array<std::array<const char*, 2>, 14> synonyms{{{"IN", "INCH"},
+                                                                 {"INCHE", "INCH"},
+                                                                 {"MILLIMETER", "MM"},
+                                                                 {"CENTIMETER", "CM"},
+                                                                 {"METER", "M"},
+                                                                 {"FOOT", "FT"},
+                                                                 {"FEET", "FT"},
+                                                                 {"MILE", "MI"},
+                                                                 {"KILOMETER", "KM"},
+                                                                 {"MICRON", "UM"},
+                                                                 {"MICROMETER", "UM"},
+                                                                 {"MICROINCH", "UIN"},
+                                                                 {"MICROINCHE", "UIN"},
+                                                                 {"MILS", "MIL"}}};
+  for (const auto& [long_name, short_name] : synonyms)
+    if (word == long_name) word = short_name;
   for (const Unit& unit : units)
-    if (upper == unit.name) return unit;
+    if (word == unit.name) return unit;
   return std::nullopt;
 }
 

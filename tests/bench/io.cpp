@@ -2,25 +2,15 @@
 // the bytes in memory (a cold disk is not our speed) and ends with panels; limit 0.3 s, that is 33 MB/s.
 #include <benchmark/benchmark.h>
 
-#include <cmath>
-
+#include "bench/wavy_surface.h"
 #include "io/iges.h"
 
 namespace toile {
 namespace {
 
 TrimmedSurface face(int number) {
-  const KnotVector knots = uniform_knots(3, 34, {0, 1});
-  const int n = knots.control_point_count();
-  Eigen::Matrix3Xd points(3, n * n);
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const double u = knots.greville(i), v = knots.greville(j);
-      points.col(i + n * j) << 700 * u + 3 * number, 500 * v + std::sin(9 * u),
-          40 * std::sin(5 * u + number) * std::cos(4 * v);
-    }
   TrimmedSurface out;
-  out.surface = NurbsSurface(knots, knots, points);
+  out.surface = bench::wavy_surface(34, number);
   out.metres_per_unit = 0.001;
   TrimLoop loop;
   const Eigen::Vector2d corners[] = {{0.1, 0.1}, {0.9, 0.15}, {0.85, 0.9}, {0.1, 0.8}};

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <string_view>
 
+#include "fuzz/cpu_limit.h"
 #include "geometry/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const toile::CpuLimit limit;
   try {
     toile::parse_dxf({reinterpret_cast<const char*>(data), size}, "fuzz.dxf");
   } catch (const toile::InputError&) {

@@ -7,9 +7,11 @@
 #include <cstdlib>
 #include <string>
 
+#include "fuzz/cpu_limit.h"
 #include "geometry/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const toile::CpuLimit limit;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   try {
     const toile::PanelFile file = toile::parse_iges(text, "fuzz.igs");

@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <string_view>
 
+#include "fuzz/cpu_limit.h"
 #include "geometry/error.h"
 #include "io/pattern_json.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const toile::CpuLimit limit;
   try {
     toile::parse_pattern({reinterpret_cast<const char*>(data), size}, "fuzz.json");
   } catch (const toile::InputError&) {

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <string_view>
 
+#include "fuzz/cpu_limit.h"
 #include "geometry/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const toile::CpuLimit limit;
   static const std::filesystem::path place = std::filesystem::path(TOILE_SAMPLES) / "skirt_panel" / "scene.toml";
   try {
     toile::parse_scene({reinterpret_cast<const char*>(data), size}, place);

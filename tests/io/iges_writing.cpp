@@ -37,15 +37,16 @@ IgesHeader header_of(const PanelFile& file) {
   return header;
 }
 
-void expect_same_trims(const TrimmedSurface& a, const TrimmedSurface& b) {
-  ASSERT_EQ(a.loops.size(), b.loops.size());
-  for (std::size_t l = 0; l < a.loops.size(); ++l) {
-    EXPECT_EQ(a.loops[l].kind, b.loops[l].kind);
-    EXPECT_EQ(a.loops[l].index, b.loops[l].index);
-    ASSERT_EQ(a.loops[l].curves.size(), b.loops[l].curves.size());
-    for (std::size_t k = 0; k < a.loops[l].curves.size(); ++k) {
-      EXPECT_EQ(a.loops[l].curves[k].index, b.loops[l].curves[k].index);
-      EXPECT_EQ(a.loops[l].curves[k].curve, b.loops[l].curves[k].curve);
+// What is written is head to tail in its own order, whatever the source's was.
+void expect_same_trims(const TrimmedSurface& back, const TrimmedSurface& source) {
+  ASSERT_EQ(back.loops.size(), source.loops.size());
+  for (std::size_t l = 0; l < back.loops.size(); ++l) {
+    EXPECT_EQ(back.loops[l].kind, source.loops[l].kind);
+    EXPECT_EQ(back.loops[l].index, source.loops[l].index);
+    ASSERT_EQ(back.loops[l].curves.size(), source.loops[l].curves.size());
+    for (std::size_t k = 0; k < back.loops[l].curves.size(); ++k) {
+      EXPECT_EQ(back.loops[l].curves[k].index, static_cast<int>(k));
+      EXPECT_EQ(back.loops[l].curves[k].curve, source.loops[l].curves[k].curve);
     }
   }
 }
