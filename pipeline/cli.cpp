@@ -92,7 +92,9 @@ double length_option(const std::string& text, const char* option) {
 Scene scene_of(const DrapeArguments& a) {
   std::vector<std::string> settings = a.settings;
   for (const std::string& s : settings) {
-    if (s.find('=') == std::string::npos) throw UsageError(fmt::format("--set {}: expected key=value", s));
+    const std::size_t equals = s.find('=');
+    if (equals == std::string::npos || s.find_first_not_of(" .[]") == equals)
+      throw UsageError(fmt::format("--set {}: expected key=value", s));
   }
   if (!a.until.empty()) settings.push_back("solver.until=" + a.until);
   if (!a.time_limit.empty()) settings.push_back("solver.time_limit=" + a.time_limit);

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <numbers>
 
 #include "geometry/error.h"
 #include "io/mesh_files.h"
 #include "io/obj.h"
 #include "io/vtu.h"
+#include "pipeline/units.h"
 #include "trimming/triangulation.h"
 
 namespace toile {
@@ -34,8 +34,7 @@ std::string new_iges(PanelFile file, const InspectOptions& options, const std::s
       const std::optional<double> grain = grain_angle(panel);
       out.warnings.push_back(fmt::format(
           "panel '{}': its {} marks (notches, lines, texts) are not written to IGES{}", panel.name, panel.marks.size(),
-          grain ? fmt::format("; its grain line is grain_deg = {:.6g}", *grain * 180 / std::numbers::pi)
-                : std::string()));
+          grain ? "; its grain line is grain_deg = " + degrees_text(*grain) : std::string()));
     }
     if (asks(options)) panel.surface = refined(panel, options);
     faces.push_back({std::move(panel), {}, 0, std::nullopt});

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -15,6 +14,7 @@
 #include "pipeline/build.h"
 #include "pipeline/checkpoint.h"
 #include "pipeline/cli.h"
+#include "pipeline/interrupt.h"
 #include "pipeline/json_text.h"
 #include "pipeline/output.h"
 #include "pipeline/run.h"
@@ -30,31 +30,6 @@ double since(Clock::time_point start) {
 
 // Of wall time between checkpoints; the promise is two seconds.
 constexpr double checkpoint_seconds = 1;
-
-volatile std::sig_atomic_t interrupted = 0;
-void on_interrupt(int) {
-  interrupted = 1;
-}
-
-// SIGINT and SIGTERM ask the run to finish while this lives; a second one of the same kind ends the program at once.
-class InterruptGuard {
- public:
-  InterruptGuard() {
-    interrupted = 0;
-    struct sigaction action = {};
-    action.sa_handler = on_interrupt;
-    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-    ::sigaction(SIGINT, &action, &interrupt_);
-    ::sigaction(SIGTERM, &action, &terminate_);
-  }
-  ~InterruptGuard() {
-    ::sigaction(SIGINT, &interrupt_, nullptr);
-    ::sigaction(SIGTERM, &terminate_, nullptr);
-  }
-
- private:
-  struct sigaction interrupt_ = {}, terminate_ = {};
-};
 
 int exit_code(RunExit exit) {
   switch (exit) {
@@ -170,7 +145,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   RunHooks hooks;
   hooks.allocations = options.allocations;
   hooks.stop = [&] {
-    if (interrupted != 0) return RunExit::interrupted;
+    if (guard.asked()) return RunExit::interrupted;
     const auto& limit = built.scene.time_limit;
     return limit && since(called) >= *limit ? RunExit::time_limit : RunExit::ok;
   };

@@ -13,6 +13,7 @@
 #include "io/triangle_mesh.h"
 #include "pipeline/scene.h"
 #include "pipeline/templates.h"
+#include "pipeline/units.h"
 
 namespace toile {
 namespace {
@@ -255,8 +256,7 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
     text += fmt::format("\n[[panel]]\nname = {}\n{} = {}\nrefine = {{ degree = 2, span = \"20 mm\" }}\n",
                         quoted(panels[k].name), json ? "pattern" : "file", quoted(path_from(scene, path)));
     if (const auto grain = grain_angle(panels[k])) {
-      text += fmt::format("# grain_deg = {:.6g}     is what the panel's grain line says\n",
-                          *grain * 180 / std::numbers::pi);
+      text += fmt::format("# grain_deg = {}     is what the panel's grain line says\n", degrees_text(*grain));
     }
     const PatternPlace& place = pattern.places[k];
     text += fmt::format("place = {{ translate = {}, rotate_deg = [{}, {}, {}] }}\nfabric = \"cotton\"\n",

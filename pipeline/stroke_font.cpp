@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string>
 
 namespace toile {
@@ -17,7 +16,7 @@ struct Glyph {
   std::string_view strokes;
 };
 
-constexpr std::array<Glyph, 52> glyphs{{
+constexpr std::array<Glyph, 87> glyphs{{
     {'0', 8, "~3q0q0e6e6q3q"},
     {'1', 8, "1o3q3e"},
     {'2', 8, "~0o0q6q6k0e 0e6e"},
@@ -70,6 +69,41 @@ constexpr std::array<Glyph, 52> glyphs{{
     {'y', 8, "0m3e 6m2a"},
     {'z', 8, "0m6m0e6e"},
     {'*', 8, "0k6k 1h5n 5h1n"},
+    {'A', 8, "0e3q6e 1i5i"},
+    {'B', 8, "0e0q ~0q5q5k0k ~0k6k6e0e"},
+    {'C', 8, "~6n6q0q0e6e6h"},
+    {'D', 8, "~0q6q6e0e 0e0q"},
+    {'E', 8, "6q0q0e6e 0k5k"},
+    {'F', 8, "6q0q0e 0k5k"},
+    {'G', 8, "~6n6q0q0e6e6k 6k3k"},
+    {'H', 8, "0e0q 6e6q 0k6k"},
+    {'I', 5, "1e1q 0e2e 0q2q"},
+    {'J', 7, "~5h5e0e0h 5h5q"},
+    {'K', 8, "0e0q 6q0j 2l6e"},
+    {'L', 8, "0q0e6e"},
+    {'M', 10, "0e0q4h8q8e"},
+    {'N', 8, "0e0q6e6q"},
+    {'O', 10, "~4q0q0e8e8q4q"},
+    {'P', 8, "0e0q ~0q6q6j0j"},
+    {'Q', 10, "~4q0q0e8e8q4q 5h8d"},
+    {'R', 8, "0e0q ~0q6q6j0j 3j6e"},
+    {'S', 8, "~6n6q0q0k6k6e0e0h"},
+    {'T', 8, "0q6q 3q3e"},
+    {'U', 8, "0q0i ~0i0e6e6i 6i6q"},
+    {'V', 8, "0q3e6q"},
+    {'W', 10, "0q2e4n6e8q"},
+    {'X', 8, "0q6e 6q0e"},
+    {'Y', 8, "0q3k6q 3k3e"},
+    {'Z', 8, "0q6q0e6e"},
+    {'\'', 4, "1q1n"},
+    {'"', 6, "1q1n 3q3n"},
+    {'#', 9, "2e3q 5e6q 0i7i 1m8m"},
+    {'&', 9, "~7j6e0e0j5m5q1q1n7e"},
+    {'!', 4, "1q1h 1e1f"},
+    {'?', 8, "~0o0q6q6l3k3h 3e3f"},
+    {';', 4, "1f0c 1l1m"},
+    {'[', 5, "3q1q1c3c"},
+    {']', 5, "0q2q2c0c"},
 }};
 
 // Cuts corners: towards the quadratic B-spline of the polygon, its ends kept. [Chaikin 1974]
@@ -92,8 +126,8 @@ TextStrokes text_strokes(std::string_view text, float size) {
   constexpr float digit_height = 12;
   const float scale = size / digit_height;
   TextStrokes out;
-  for (const char raw : text) {
-    const char c = static_cast<char>(std::tolower(static_cast<unsigned char>(raw)));
+  for (const char c : text) {
+    if ((static_cast<unsigned char>(c) & 0xc0) == 0x80) continue;  // the rest of a UTF-8 character
     const auto glyph = std::find_if(glyphs.begin(), glyphs.end(), [c](const Glyph& g) { return g.character == c; });
     if (glyph == glyphs.end()) {
       out.width += 6 * scale;

@@ -8,7 +8,7 @@
 namespace toile {
 
 // Centre lines of a line of text, y downwards from the baseline (negative above it); `size` is the height of a digit.
-// Upper-case letters take the lower-case form, unknown characters leave a gap.
+// UTF-8; unknown characters leave a gap.
 struct TextStrokes {
   std::vector<std::vector<Eigen::Vector2f>> lines;
   float width = 0;

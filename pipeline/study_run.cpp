@@ -2,10 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
-#include <csignal>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -13,6 +11,7 @@
 #include "geometry/error.h"
 #include "io/file.h"
 #include "pipeline/cli.h"
+#include "pipeline/interrupt.h"
 #include "pipeline/json_text.h"
 #include "pipeline/scene.h"
 #include "pipeline/study.h"
@@ -24,27 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-volatile std::sig_atomic_t interrupted = 0;
-void on_interrupt(int) {
-  interrupted = 1;
-}
-
-// While this lives, SIGINT and SIGTERM end the present run and the study.
-class InterruptGuard {
- public:
-  InterruptGuard() {
-    interrupted = 0;
-    for (std::size_t k = 0; k < signals.size(); ++k) previous_[k] = std::signal(signals[k], on_interrupt);
-  }
-  ~InterruptGuard() {
-    for (std::size_t k = 0; k < signals.size(); ++k) std::signal(signals[k], previous_[k]);
-  }
-
- private:
-  static constexpr std::array<int, 2> signals{SIGINT, SIGTERM};
-  std::array<void (*)(int), 2> previous_{};
-};
 
 // FNV-1a, 64 bits: tells inputs apart, guards nothing.
 class Hash {
@@ -291,7 +269,7 @@ class Runner {
         }
       }
     }
-    result.interrupted = interrupted != 0;
+    result.interrupted = guard_.asked();
     return result;
   }
 
@@ -317,7 +295,7 @@ class Runner {
   void one(const StudySeries& series, const StudyCase& c, StudyRun& run) {
     run.id = run_id(series, c, run.repeat);
     ++done_;
-    if (interrupted) return;
+    if (guard_.asked()) return;
     const fs::path folder = directory_ / "runs" / run.id, log = folder.string() + ".log",
                    record = folder.string() + ".json";
     const std::string input = fmt::format("{:016x}", input_of(study_, series, c, options_));
@@ -328,7 +306,7 @@ class Runner {
       std::error_code error;
       fs::remove(record, error);
       fs::remove_all(folder, error);
-      run.process = run_process(command(series, c, folder), log, study_.limits, [] { return interrupted != 0; });
+      run.process = run_process(command(series, c, folder), log, study_.limits, [this] { return guard_.asked(); });
       if (run.process.end == ProcessResult::End::stopped) return;
       write_record(record, input, run.process);
     }
@@ -393,6 +371,7 @@ class Runner {
     write_file(file, json_text(json) + "\n");
   }
 
+  const InterruptGuard guard_;  // the results are written under it too
   const Study& study_;
   const StudyOptions& options_;
   Console& console_;
@@ -439,7 +418,6 @@ const char* name(Verdict verdict) {
 }
 
 int run_study(const Study& study, const StudyOptions& options, Console& console) {
-  const InterruptGuard guard;
   Runner runner(study, options, console);
   StudyResult result = runner();
   console.end_live();

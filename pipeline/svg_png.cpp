@@ -256,10 +256,7 @@ void Painter::stroke(const Points& line, const Vector3f& colour, double width) {
 
 void Painter::text(const SvgItem& item, const Paint& paint) {
   const float size = static_cast<float>(0.72 * item.size);  // digits of a font are lower than its size
-  std::string words;
-  for (const char c : item.words)
-    words += static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) > 0x7e ? '?' : c;
-  const TextStrokes strokes = text_strokes(words, size);
+  const TextStrokes strokes = text_strokes(item.words, size);
   Vector2d at = item.at;
   if (item.anchor != TextAnchor::start) at.x() -= item.anchor == TextAnchor::middle ? strokes.width / 2 : strokes.width;
   const double pen = std::max(1.1, 0.12 * item.size);

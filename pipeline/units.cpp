@@ -197,4 +197,8 @@ double parse_quantity(std::string_view text, const Dimension& expected) {
   return value.factor;
 }
 
+std::string degrees_text(double radians) {
+  return fmt::format("{}", std::round(radians * 180 / std::numbers::pi * 1e6) / 1e6 + 0.0);
+}
+
 }  // namespace toile

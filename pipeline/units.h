@@ -35,4 +35,7 @@ double parse_quantity(std::string_view text, const Dimension& expected);
 // "kg/m2", "m", "1/s", "a number": the SI unit of a dimension, for messages.
 std::string unit_name(const Dimension& dimension);
 
+// The angle in degrees, to a millionth of one, for messages: a quarter turn is "90", a rounding error "0".
+std::string degrees_text(double radians);
+
 }  // namespace toile

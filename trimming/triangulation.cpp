@@ -345,12 +345,14 @@ class Mesher {
 
   // Too large, or too thin while its edges aren't short. The circumcircle of an equilateral triangle has 0.577 of its
   // edge; circles of 0.7 leave edges around the size. A ratio of radius to shortest edge above sqrt(2) is an angle
-  // below 20.7 degrees [Ruppert 1995].
+  // below 20.7 degrees [Ruppert 1995]. Where the panel is all but collapsed (a weight of 1e4), triangles are thin in
+  // space however they are divided: without a long edge they stay.
   bool poor(Delaunay::Face_handle f) const {
     const auto [a, b, c] = edges(f);
     const double shortest = std::min({a, b, c}), p = (a + b + c) / 2;
     const double radius = a * b * c / (4 * std::sqrt(std::max(p * (p - a) * (p - b) * (p - c), 0.0)));
-    return radius > 0.7 * size_ || (radius > std::numbers::sqrt2 * shortest && shortest > size_ / 8);
+    return (radius > 0.7 * size_ && std::max({a, b, c}) > size_) ||
+           (radius > std::numbers::sqrt2 * shortest && shortest > size_ / 8);
   }
 
   // Circumcentres of poor triangles become vertices unless they lie out of sight or in the circle over a boundary edge:

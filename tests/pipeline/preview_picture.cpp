@@ -8,6 +8,7 @@
 
 #include "geometry/error.h"
 #include "pipeline/preview.h"
+#include "pipeline/stroke_font.h"
 #include "support/draped.h"
 
 #pragma GCC diagnostic push
@@ -154,6 +155,21 @@ TEST_F(Preview, RefusesAFrameWithNothingToDraw) {
   test::Draped draped;
   draped.surface = draped.surface.with_points(draped.surface.points() * 1e300);
   EXPECT_THROW(preview_png(draped.frame()), OutputError);
+}
+
+TEST(StrokeFont, CapitalsStandFromTheBaselineToTheHeightOfADigit) {
+  for (char c = 'A'; c <= 'Z'; ++c) {
+    float low = -100, high = 100;
+    for (const auto& line : text_strokes(std::string(1, c), 30).lines)
+      for (const Eigen::Vector2f& p : line) low = std::max(low, p.y()), high = std::min(high, p.y());
+    EXPECT_NEAR(high, -30, 1) << c;
+    EXPECT_NEAR(low, 0, c == 'Q' ? 3 : 1) << c;
+  }
+}
+
+TEST(StrokeFont, ACharacterOfSeveralBytesIsOneGap) {
+  EXPECT_TRUE(text_strokes("é", 10).lines.empty());
+  EXPECT_EQ(text_strokes("é", 10).width, text_strokes(" ", 10).width);
 }
 
 }  // namespace

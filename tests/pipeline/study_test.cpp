@@ -97,7 +97,7 @@ struct Lab : Folder {
     std::exception_ptr trouble;
     try {
       Study study = read_study(*this / "study.toml");
-      study.limits.grace_seconds = 0.3;
+      study.limits.grace_seconds = 2;
       code = run_study(study, options, console);
     } catch (...) {
       trouble = std::current_exception();
@@ -214,7 +214,7 @@ TEST(Study, FailedRunsAreRowsWithTheirCause) {
   Lab lab("failed");
   ASSERT_EQ(
       lab.run(depth + three +
-              "limits.seconds = 0.5\n"
+              "limits.seconds = 2\n"
               "vary.panel.0.name = [\"fine\", \"refuse\", \"solver\", \"crash\", \"hang\", \"nothing\", \"limit\"]\n"),
       0);
   const auto rows = csv(read_file(lab / "out/study.csv"));
@@ -224,7 +224,7 @@ TEST(Study, FailedRunsAreRowsWithTheirCause) {
   EXPECT_EQ(causes[1], "scene.toml:3: nonsense");
   EXPECT_EQ(causes[2], "diverged");
   EXPECT_NE(causes[3].find("signal 11"), std::string::npos) << causes[3];
-  EXPECT_EQ(causes[4], "not done after 0.5 s");
+  EXPECT_EQ(causes[4], "not done after 2 s");
   EXPECT_EQ(causes[5], "it left no report.json");
   EXPECT_EQ(causes[6], "the limit is not met");
   EXPECT_EQ(column(rows, "error")[1], "");
@@ -344,7 +344,7 @@ TEST(Study, AMissingQuantityNamesTheNearest) {
 
 TEST(Study, StabilityIsAVerdictOnEachRun) {
   Lab lab("stability");
-  const std::string head = "kind = \"stability\"\nlimits.seconds = 0.5\n";
+  const std::string head = "kind = \"stability\"\nlimits.seconds = 2\n";
   EXPECT_EQ(lab.run(head + "vary.panel.0.name = [\"fine\", \"refuse\", \"solver\", \"limit\", \"slow\"]\n"), 0);
   auto rows = csv(read_file(lab / "out/study.csv"));
   EXPECT_EQ(column(rows, "verdict"), (std::vector<std::string>{"stable", "refused", "stopped", "stopped", "stopped"}));

@@ -59,5 +59,11 @@ TEST(Units, NonsenseIsRefused) {
   }
 }
 
+TEST(Units, DegreesShowNoRoundingErrors) {
+  EXPECT_EQ(degrees_text(-1e-17), "0");
+  EXPECT_EQ(degrees_text(std::atan2(1, -1e-16)), "90");
+  EXPECT_EQ(degrees_text(-std::atan(1.0) / 2), "-22.5");
+}
+
 }  // namespace
 }  // namespace toile

@@ -121,6 +121,26 @@ TEST(Triangulation, CurvedPanelsKeepTheSizeInSpace) {
   EXPECT_GT(mesh.quality.smallest_angle, 18 * degree);
 }
 
+// The unit square with one heavy or light control point. A heavy one draws its cells together but for a seam of
+// 1/sqrt(weight) of their width, which takes triangles of that width along its whole length.
+TEST(Triangulation, AHeavyWeightTakesNoMoreTrianglesThanItsSeam) {
+  const KnotVector knots = uniform_knots(2, 8);
+  const int n = knots.control_point_count();
+  Eigen::Matrix3Xd net(3, n * n);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) net.col(i + n * j) << knots.greville(i), knots.greville(j), 0;
+  const auto count = [&](double weight) {
+    std::vector<double> weights(static_cast<std::size_t>(n * n), 1);
+    weights[static_cast<std::size_t>(n / 2 * (n + 1))] = weight;
+    TrimmedSurface face = trimmed(NurbsSurface(knots, knots, net, weights), {});
+    face.loops = {natural_loop(face.surface)};
+    return static_cast<double>(mesh_of(face, {}).triangles.size());
+  };
+  const double plain = count(1);
+  for (const double weight : {1e-4, 1e2, 1e4})
+    EXPECT_LT(count(weight), 2 * plain * std::max(1.0, std::sqrt(weight))) << weight;
+}
+
 // Two panels that are given the same places along a side have exactly these there, whatever their sizes.
 TEST(Triangulation, SeamsMatch) {
   const std::vector<double> places = {0.1, 0.25, 0.375, 0.5, 0.8};

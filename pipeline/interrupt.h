@@ -1,0 +1,22 @@
+// SIGINT and SIGTERM as a question that the program asks itself.
+#pragma once
+
+#include <csignal>
+
+namespace toile {
+
+// While this lives, SIGINT and SIGTERM ask the program to finish; a second one of the same kind ends it at once. One at
+// a time.
+class InterruptGuard {
+ public:
+  InterruptGuard();
+  ~InterruptGuard();
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+  bool asked() const;
+
+ private:
+  struct sigaction interrupt_ = {}, terminate_ = {};
+};
+
+}  // namespace toile
