@@ -126,7 +126,8 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"loads_work", e.load_work}, {"motion_work", e.motion_work}, {"injected", e.injected}};
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
                           {"iterations_max", run.iterations_max},
-                          {"unconverged_steps", run.unconverged_steps}};
+                          {"unconverged_steps", run.unconverged_steps},
+                          {"solver", scene.strain_limit.solver == LimitSolver::lagrange ? "lagrange" : "projection"}};
   report["contact"] = {{"max_penetration", 0.0}, {"min_distance", nullptr}};  // nothing touches in this version
   report["seams"] = {{"max_gap", 0.0}};
   Json stages = Json::array({"shell"});

@@ -444,7 +444,16 @@ void read_limit(Table table, Scene& scene) {
     limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::second_order;
   if (band && limit.variant == ProjectionVariant::paper)
     throw InputError(table.where() + ": variant = \"paper\" has no bands");
-  table.choice("solver", {"fast"}, {"lagrange", "springs"});
+  // "fast" is another word for the projection.
+  if (const auto solver = table.choice("solver", {"projection", "fast", "lagrange"}, {"springs"});
+      solver && *solver == "lagrange") {
+    limit.solver = LimitSolver::lagrange;
+    if (band) throw InputError(table.where() + ": solver = \"lagrange\" has no bands");
+    for (const char* key : {"stiffness", "variant"})
+      table.refuse(
+          key,
+          fmt::format("{} belongs to solver = \"projection\"; \"lagrange\" holds the limit as hard equalities", key));
+  }
   table.choice("points", {"knot-mesh"}, {"gauss-2x2", "gauss-1", "cell-average", "greville"});
   table.number(limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
   if (const auto n = table.integer("max_iterations", 1, 10000)) limit.max_iterations = *n;

@@ -85,12 +85,15 @@ struct SceneObstacle {
   std::string where;
 };
 
+enum class LimitSolver { projection, lagrange };
+
 struct StrainLimit {
   bool on = false;
   double tolerance = 0.01;
   StrainBand weft = {}, warp = {};  // "inextensible": both tolerance, without slack
   std::optional<double> stiffness;  // N/m of force per strain before the wall; unset: chosen by the loads
-  ProjectionVariant variant = ProjectionVariant::second_order;
+  LimitSolver solver = LimitSolver::projection;
+  ProjectionVariant variant = ProjectionVariant::second_order;  // of the projection
   double regularisation = 1e-3;  // the default of ProjectionOptions
   int max_iterations = 50;
 };

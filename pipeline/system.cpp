@@ -8,6 +8,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "analysis/projection/fast_projection.h"
+#include "analysis/projection/lagrange_newton.h"
 #include "analysis/projection/select_rows.h"
 #include "geometry/error.h"
 #include "pipeline/places.h"
@@ -264,7 +266,7 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
   if (limit.on) {
     const Eigen::VectorXd mass = row_masses(build).cwiseMax(build.mass_floor);
     rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
-    if (limit.variant == ProjectionVariant::second_order) {
+    if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::second_order) {
       std::vector<double> stiffness, rate;
       for (std::size_t k = 0; k < build.panels.size(); ++k) {
         const ShellPanel& panel = build.model->panels()[k];
@@ -290,7 +292,10 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     options.tolerance = limit.tolerance;
     options.regularisation = limit.regularisation;
     options.max_iterations = limit.max_iterations;
-    system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
+    if (limit.solver == LimitSolver::lagrange)
+      system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
+    else
+      system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
   }
   dynamic.projection = system->projection.get();
   return system;

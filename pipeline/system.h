@@ -20,7 +20,7 @@ struct System {
   int strain_rows = 0, place_rows = 0;
   std::vector<int> place_pin;  // pin of each place row
   std::unique_ptr<AffineMap> map;
-  std::unique_ptr<FastProjection> projection;  // null: nothing to project
+  std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
   DynamicSystem dynamic;
 };
 

@@ -40,7 +40,7 @@ void add(const ScalarRow& row, const Eigen::Vector3d& force, Vector& f) {
 // Adds the constraints' forces to f (control points) and returns those of the place rows.
 Eigen::Matrix3Xd add_constraint_forces(const DynamicSystem& system, double dt, Vector& f) {
   if (!system.projection) return Eigen::Matrix3Xd(3, 0);
-  const FastProjection& projection = *system.projection;
+  const ConstraintSolver& projection = *system.projection;
   const ConstraintRows& rows = projection.rows();
   const double per_step = 1 / (dt * dt);
   for (std::size_t r = 0; r < rows.strain.size(); ++r) {

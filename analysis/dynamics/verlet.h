@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "analysis/affine_map.h"
-#include "analysis/projection/fast_projection.h"
+#include "analysis/projection/constraint_solver.h"
 #include "analysis/shell/shell_model.h"
 
 namespace toile {
@@ -47,7 +47,7 @@ struct DynamicSystem {
   const AffineMap* map = nullptr;
   Eigen::VectorXd node_mass, node_drag;  // reduced lumped mass with floor [kg], drag [kg/s]
   Loads loads;
-  FastProjection* projection = nullptr;  // null: no limits and no place rows
+  ConstraintSolver* projection = nullptr;  // null: no limits and no place rows
 };
 
 // Accelerations (and nothing else) from places and velocities: for the start and after a change of the system.

@@ -7,6 +7,7 @@
 
 #include "analysis/affine_map.h"
 #include "analysis/projection/constraint_rows.h"
+#include "analysis/projection/constraint_solver.h"
 #include "analysis/projection/limit_law.h"
 
 namespace toile {
@@ -35,48 +36,21 @@ struct ProjectionOptions {
   int max_iterations = 50;
 };
 
-struct ProjectionReport {
-  bool converged = false;  // <=> strain_violation <= tolerance and place_violation <= place_tolerance
-  int iterations = 0;
-  double strain_violation = 0;  // at the end: largest |C|, with slack in the band what C lies outside of it
-  double place_violation = 0;   // m
-  double residual = 0;          // largest |C - law(lambda)| of rows with a stiffness, over the band
-  bool damped = false;  // the start's gradients did not lead to the law's solution: the candidate's did, which damps
-  int worst_row = -1;   // strain row with the largest violation
-  double energy = 0;    // J, of the limit laws at the end
-  double factor_seconds = 0;  // wall time of the numeric factorisations
-};
-
-// Constraint forces of the steps before: what the next step needs to be of second order. Empty where there were none.
-struct ConstraintForces {
-  Eigen::Matrix3Xd strain;  // N m, per strain row: at the start of the step, one and two steps before
-  Eigen::Matrix3Xd place;   // N, per place row at the start: a first guess only
-};
-
-// What the last projection left behind, for reactions: rows and shapes as below.
-struct ProjectionMemory {
-  Eigen::VectorXd strain_multipliers;
-  Eigen::Matrix3Xd place_multipliers, strain_impulses;
-};
-
-//   (1) fixed control points don't move;
-//   (2) linear momentum is kept where nothing is pinned; a step's impulse has no moment about the places where its
-//       directions were taken (angular momentum);
-//   (3) pattern analysed once, in the constructor;
-//   (4) a strain row that touches only fixed control points takes no part and counts in no violation.
-class FastProjection {
+// Besides what every ConstraintSolver keeps: a step's impulse has no moment about the places where its directions were
+// taken (angular momentum).
+class FastProjection final : public ConstraintSolver {
  public:
   // Throws SolverError where a node has no mass or a place row touches only fixed control points.
   FastProjection(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
                  const ProjectionOptions& options = {});
-  ~FastProjection();
+  ~FastProjection() override;
   FastProjection(FastProjection&&) noexcept;
   FastProjection& operator=(FastProjection&&) noexcept;
 
   // Corrects x (free nodes) at time t onto C = 0 along the gradients at x, all rows hard. Iterates until the
   // tolerances are met, `max_iterations` are spent, or fifteen iterations in a row gain nothing (constraints that
   // contradict each other; going on would only pile up multipliers).
-  ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t);
+  ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) override;
 
   // The same for the candidate x of a step from the state `start` at t - dt; `forces` become those at t. Rows with a
   // stiffness obey their law F(C):
@@ -88,26 +62,18 @@ class FastProjection {
   // Where the gradients at the start don't lead there (light nodes that turn far in a step), those of the candidate are
   // taken and F* = F_n+1: of first order, damping. The paper's variant projects and leaves `forces` alone.
   ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>& start,
-                        double dt, ConstraintForces& forces);
+                        double dt, ConstraintForces& forces) override;
 
-  // Sum over the last projection's iterations of the multipliers, per row [kg m2 for strain rows, kg m for place rows]:
-  // divided by dt^2 they are the constraint forces' quadrature weights [N m, N]. After a step those at its end.
-  const Eigen::VectorXd& strain_multipliers() const;
-  const Eigen::Matrix3Xd& place_multipliers() const;
-  // Multiplier times direction, summed over the iterations [kg m]: control point I was pushed by -d_I times its column.
-  const Eigen::Matrix3Xd& strain_impulses() const;
-  // All three, and putting them back where a run is taken up again; false where their sizes are of other rows.
-  ProjectionMemory memory() const;
-  bool restore(const ProjectionMemory& memory);
-
-  // How far x is from the constraints, nothing moved.
-  ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t);
-
-  // Energy [J] of the limit laws at x; 0 in the paper's variant.
-  double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t);
-  const ConstraintRows& rows() const;
+  ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
+  double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;  // 0 in the paper's variant
+  const Eigen::VectorXd& strain_multipliers() const override;
+  const Eigen::Matrix3Xd& place_multipliers() const override;
+  const Eigen::Matrix3Xd& strain_impulses() const override;
+  ProjectionMemory memory() const override;
+  bool restore(const ProjectionMemory& memory) override;
+  const ConstraintRows& rows() const override;
   const ProjectionOptions& options() const;
-  std::size_t factor_nonzeros() const;
+  std::size_t factor_nonzeros() const override;
 
  private:
   struct Impl;

@@ -4,8 +4,10 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <random>
 #include <vector>
 
+#include "analysis/affine_map.h"
 #include "analysis/projection/constraint_rows.h"
 #include "geometry/basis.h"
 #include "geometry/nurbs_surface.h"
@@ -58,6 +60,19 @@ inline std::vector<StrainRow> vertex_rows(const FlatCloth& c) {
       ++point;
     }
   return rows;
+}
+
+// Nothing held.
+inline AffineMap free_map(const FlatCloth& c) {
+  return AffineMap(AffineMap::identity(c.n * c.n), {}, nullptr);
+}
+
+inline Eigen::VectorXd disturbed(const Eigen::VectorXd& q, double size, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> draw(-size, size);
+  Eigen::VectorXd out = q;
+  for (double& value : out) value += draw(rng);
+  return out;
 }
 
 inline double strain(const ScalarRow& row, const Eigen::VectorXd& q) {

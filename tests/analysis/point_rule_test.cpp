@@ -8,6 +8,7 @@
 
 #include "analysis/dynamics/time_step.h"
 #include "analysis/dynamics/verlet.h"
+#include "analysis/projection/fast_projection.h"
 #include "analysis/projection/select_rows.h"
 #include "geometry/refine.h"
 #include "support/panels.h"

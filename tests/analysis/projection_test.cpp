@@ -1,29 +1,23 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <random>
 
 #include "analysis/flat_cloth.h"
 #include "analysis/projection/fast_projection.h"
+#include "analysis/projection/lagrange_newton.h"
 #include "geometry/error.h"
 #include "support/near.h"
 
 namespace toile {
 namespace {
 
+using test::disturbed;
 using test::flat_cloth;
 using test::FlatCloth;
+using test::free_map;
 using test::scalar_row;
 using test::strain;
 using test::vertex_rows;
-
-Eigen::VectorXd disturbed(const Eigen::VectorXd& q, double size, unsigned seed) {
-  std::mt19937 rng(seed);
-  std::uniform_real_distribution<double> draw(-size, size);
-  Eigen::VectorXd out = q;
-  for (double& value : out) value += draw(rng);
-  return out;
-}
 
 // Corners (0,0) and (1,0) held at rest.
 AffineMap two_corners(const FlatCloth& c) {
@@ -32,9 +26,6 @@ AffineMap two_corners(const FlatCloth& c) {
   return AffineMap(AffineMap::identity(c.n * c.n), corners,
                    [rest, corners](std::size_t k, double) { return Eigen::Vector3d(rest.segment<3>(3 * corners[k])); });
 }
-AffineMap free_map(const FlatCloth& c) {
-  return AffineMap(AffineMap::identity(c.n * c.n), {}, nullptr);
-}
 
 double largest_strain(const std::vector<StrainRow>& rows, const Eigen::VectorXd& q) {
   double largest = 0;
@@ -42,11 +33,17 @@ double largest_strain(const std::vector<StrainRow>& rows, const Eigen::VectorXd&
   return largest;
 }
 
-TEST(FastProjection, ReachesItsToleranceAndReportsTheTrueViolation) {
+// Laws of both solvers.
+template <class Solver>
+class AnySolver : public ::testing::Test {};
+using Solvers = ::testing::Types<FastProjection, LagrangeNewton>;
+TYPED_TEST_SUITE(AnySolver, Solvers);
+
+TYPED_TEST(AnySolver, ReachesItsToleranceAndReportsTheTrueViolation) {
   const FlatCloth c = flat_cloth(2, 8);
   const AffineMap map = free_map(c);
   for (double tolerance : {1e-2, 1e-6}) {
-    FastProjection projection(map, c.mass, {vertex_rows(c), {}}, {.tolerance = tolerance});
+    TypeParam projection(map, c.mass, {vertex_rows(c), {}}, {.tolerance = tolerance});
     Eigen::VectorXd x = disturbed(c.rest, 0.02, 3);
     ASSERT_GT(largest_strain(vertex_rows(c), x), 0.05);
     const ProjectionReport report = projection.project(x, 0);
@@ -59,9 +56,9 @@ TEST(FastProjection, ReachesItsToleranceAndReportsTheTrueViolation) {
   }
 }
 
-TEST(FastProjection, SaysThatItDidNotConverge) {
+TYPED_TEST(AnySolver, SaysThatItDidNotConverge) {
   const FlatCloth c = flat_cloth(2, 8);
-  FastProjection projection(free_map(c), c.mass, {vertex_rows(c), {}}, {.tolerance = 1e-9, .max_iterations = 1});
+  TypeParam projection(free_map(c), c.mass, {vertex_rows(c), {}}, {.tolerance = 1e-9, .max_iterations = 1});
   Eigen::VectorXd x = disturbed(c.rest, 0.02, 3);
   const ProjectionReport report = projection.project(x, 0);
   EXPECT_FALSE(report.converged);
@@ -69,9 +66,9 @@ TEST(FastProjection, SaysThatItDidNotConverge) {
   EXPECT_GT(report.strain_violation, 1e-9);
 }
 
-TEST(FastProjection, ProjectsOnceEvenWhereEverythingIsMet) {
+TYPED_TEST(AnySolver, ProjectsOnceEvenWhereEverythingIsMet) {
   const FlatCloth c = flat_cloth(2, 8);
-  FastProjection projection(free_map(c), c.mass, {vertex_rows(c), {}});
+  TypeParam projection(free_map(c), c.mass, {vertex_rows(c), {}});
   Eigen::VectorXd x = disturbed(c.rest, 1e-5, 3);
   const double before = largest_strain(vertex_rows(c), x);
   const ProjectionReport report = projection.project(x, 0);
@@ -79,10 +76,10 @@ TEST(FastProjection, ProjectsOnceEvenWhereEverythingIsMet) {
   EXPECT_LT(largest_strain(vertex_rows(c), x), 0.1 * before);
 }
 
-TEST(FastProjection, NeverMovesFixedControlPoints) {
+TYPED_TEST(AnySolver, NeverMovesFixedControlPoints) {
   const FlatCloth c = flat_cloth(2, 8);
   const AffineMap map = two_corners(c);
-  FastProjection projection(map, map.reduce_scalar(c.mass), {vertex_rows(c), {}});
+  TypeParam projection(map, map.reduce_scalar(c.mass), {vertex_rows(c), {}});
   Eigen::VectorXd x = map.restrict(disturbed(c.rest, 0.02, 4)), q(c.rest.size());
   EXPECT_TRUE(projection.project(x, 0).converged);
   map.expand(x, 0, q);
@@ -161,12 +158,12 @@ TEST(FastProjection, LeastChangeOfKineticEnergy) {
   EXPECT_LT((null_space.transpose() * weighted).norm(), 1e-12 * null_space.norm() * weighted.norm());
 }
 
-TEST(FastProjection, PlaceRowsFollowTheirTargets) {
+TYPED_TEST(AnySolver, PlaceRowsFollowTheirTargets) {
   const FlatCloth c = flat_cloth(2, 8);
   const AffineMap map = two_corners(c);
   const auto target = [](double t) { return Eigen::Vector3d(0.5, 0.55, 0.3 * t); };
   const ScalarRow row = scalar_row(c, 0.41, 0.58, 0);
-  FastProjection projection(map, map.reduce_scalar(c.mass), {vertex_rows(c), {{row, 0, target}}});
+  TypeParam projection(map, map.reduce_scalar(c.mass), {vertex_rows(c), {{row, 0, target}}});
   Eigen::VectorXd x = map.restrict(c.rest), q(c.rest.size());
   for (double t : {0.1, 0.2, 0.3}) {
     const ProjectionReport report = projection.project(x, t);
@@ -179,7 +176,7 @@ TEST(FastProjection, PlaceRowsFollowTheirTargets) {
   }
 }
 
-TEST(FastProjection, RowsOnFixedControlPointsOnlyTakeNoPart) {
+TYPED_TEST(AnySolver, RowsOnFixedControlPointsOnlyTakeNoPart) {
   const FlatCloth c = flat_cloth(2, 8);
   const Eigen::VectorXd stretched = 1.2 * c.rest;
   std::vector<int> edge;
@@ -188,7 +185,7 @@ TEST(FastProjection, RowsOnFixedControlPointsOnlyTakeNoPart) {
     return Eigen::Vector3d(stretched.segment<3>(3 * edge[k]));  // the edge itself breaks its strain rows for good
   });
   const std::vector<StrainRow> all = vertex_rows(c);
-  FastProjection projection(map, map.reduce_scalar(c.mass), {all, {}});
+  TypeParam projection(map, map.reduce_scalar(c.mass), {all, {}});
   Eigen::VectorXd x = map.restrict(c.rest);
   const ProjectionReport report = projection.project(x, 0);
   EXPECT_TRUE(x.allFinite());
@@ -196,10 +193,10 @@ TEST(FastProjection, RowsOnFixedControlPointsOnlyTakeNoPart) {
   EXPECT_TRUE(report.worst_row < 0 || report.worst_row >= 2 * 9 || report.worst_row % 2 == 1);
 }
 
-TEST(FastProjection, ContradictingRowsEndUnconvergedAndFinite) {
+TYPED_TEST(AnySolver, ContradictingRowsEndUnconvergedAndFinite) {
   const FlatCloth c = flat_cloth(2, 8);
   const auto place = [](double x) { return [x](double) { return Eigen::Vector3d(x, 0.5, 0); }; };
-  FastProjection projection(
+  TypeParam projection(
       free_map(c), c.mass,
       {vertex_rows(c), {{scalar_row(c, 0, 0.5, 0), 0, place(0.0)}, {scalar_row(c, 1, 0.5, 0), 1, place(1.3)}}});
   Eigen::VectorXd x = c.rest;
@@ -209,10 +206,10 @@ TEST(FastProjection, ContradictingRowsEndUnconvergedAndFinite) {
   EXPECT_LT(report.iterations, 50);
 }
 
-TEST(FastProjection, TwoPinnedCornersOfAStraightEdgeStayFiniteThoughTheRowsDepend) {
+TYPED_TEST(AnySolver, TwoPinnedCornersOfAStraightEdgeStayFiniteThoughTheRowsDepend) {
   const FlatCloth c = flat_cloth(2, 8);
   const AffineMap map = two_corners(c);
-  FastProjection projection(map, map.reduce_scalar(c.mass), {vertex_rows(c), {}});
+  TypeParam projection(map, map.reduce_scalar(c.mass), {vertex_rows(c), {}});
   Eigen::VectorXd x = map.restrict(c.rest);
   // Exactly singular at rest: the sum of the edge's weft rows is the distance of the two pins.
   Eigen::VectorXd moved = x;
@@ -222,15 +219,14 @@ TEST(FastProjection, TwoPinnedCornersOfAStraightEdgeStayFiniteThoughTheRowsDepen
   EXPECT_LT((moved - x).cwiseAbs().maxCoeff(), 1e-3);
 }
 
-TEST(FastProjection, RefusesPinsOnFixedControlPointsAndNodesWithoutMass) {
+TYPED_TEST(AnySolver, RefusesPinsOnFixedControlPointsAndNodesWithoutMass) {
   const FlatCloth c = flat_cloth(2, 8);
   const AffineMap map = two_corners(c);
   const auto target = [](double) { return Eigen::Vector3d(0, 0, 0); };
-  EXPECT_THROW(FastProjection(map, map.reduce_scalar(c.mass), {{}, {{scalar_row(c, 0, 0, 0), 3, target}}}),
-               SolverError);
+  EXPECT_THROW(TypeParam(map, map.reduce_scalar(c.mass), {{}, {{scalar_row(c, 0, 0, 0), 3, target}}}), SolverError);
   Eigen::VectorXd mass = map.reduce_scalar(c.mass);
   mass[5] = 0;
-  EXPECT_THROW(FastProjection(map, mass, {vertex_rows(c), {}}), SolverError);
+  EXPECT_THROW(TypeParam(map, mass, {vertex_rows(c), {}}), SolverError);
 }
 
 TEST(LimitLaw, StrainAndMultiplierAreInversesAndTheEnergyIsTheIntegral) {

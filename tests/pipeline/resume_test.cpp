@@ -115,6 +115,18 @@ TEST(Resume, EveryPlaceLeadsToTheSameBytes) {
   }
 }
 
+TEST(Resume, TheLagrangeNewtonEndsWithTheSameBytes) {
+  const Folder folder("resume_lagrange");
+  const Build b = built(folder, busy_scene(), test::trimmed_sheet("cloth"), {"strain_limit.solver=lagrange"});
+  const Whole whole = whole_run(b);
+  ASSERT_EQ(whole.result.exit, RunExit::ok) << whole.result.reason;
+  EXPECT_EQ(whole.result.unconverged_steps, 0);
+  const std::size_t count = whole.checkpoints.size();
+  for (std::size_t k = 0; k < count; k += 1 + count / 10) {
+    expect_same_end(resumed_run(b, whole.checkpoints[k]), whole.left, "place " + std::to_string(k));
+  }
+}
+
 // Without a limit, with steps far above the bound.
 Build rash(const Folder& folder, const std::string& dt, const std::string& until) {
   return built(folder, test::scene_text("[[pin]]\nat = \"corner:0,0\"\n[[pin]]\nat = \"corner:1,0\"\n"),

@@ -153,8 +153,17 @@ TEST(Scene, ABandNamesWhatItNeeds) {
   EXPECT_NE(refusal(11, "stretch = [0.05, 0.02]").find("belongs to mode"), std::string::npos);
 }
 
+TEST(Scene, TheLagrangeNewtonTakesHardLimitsOnly) {
+  EXPECT_EQ(refusal(11, "solver = \"lagrange\""), "accepted");
+  EXPECT_EQ(refusal(11, "solver = \"projection\"\nvariant = \"paper\""), "accepted");
+  for (const char* key : {"stiffness = 1000", "variant = \"paper\""})
+    EXPECT_NE(refusal(11, std::string("solver = \"lagrange\"\n") + key).find("belongs to solver"), std::string::npos);
+  EXPECT_NE(refusal(11, "solver = \"lagrange\"\nmode = \"band\"\nstretch = [0.05, 0.02]").find("no bands"),
+            std::string::npos);
+}
+
 TEST(Scene, LaterFeaturesAreRefusedByName) {
-  expect_message(11, "solver = \"lagrange\"", {"not supported by this version", "fast"});
+  expect_message(11, "solver = \"springs\"", {"not supported by this version", "projection", "lagrange"});
   expect_message(11, "points = \"greville\"", {"not supported by this version", "knot-mesh"});
   expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});
   expect_message(15, "scheme = \"newmark\"", {"not supported by this version", "verlet"});

@@ -1,0 +1,71 @@
+// What a time step asks of whatever meets its constraints: FastProjection or LagrangeNewton.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "analysis/projection/constraint_rows.h"
+
+namespace toile {
+
+struct ProjectionReport {
+  bool converged = false;  // <=> strain_violation <= tolerance and place_violation <= place_tolerance
+  int iterations = 0;
+  double strain_violation = 0;  // at the end: largest |C|, with slack in the band what C lies outside of it
+  double place_violation = 0;   // m
+  // Of rows with a stiffness the largest |C - law(lambda)|, over the band. By the Lagrange Newton the part of the
+  // correction that is no constraint force: |M (x - candidate) + J^T lambda| over |M (x - candidate)|, weighted by
+  // M^-1.
+  double residual = 0;
+  bool damped = false;  // the method asked for found no solution: the candidate's gradients led there, which damps
+  int worst_row = -1;   // strain row with the largest violation
+  double energy = 0;    // J, of the limit laws at the end
+  double factor_seconds = 0;  // wall time of the numeric factorisations
+};
+
+// Constraint forces of the steps before: what the next step needs to be of second order. Empty where there were none.
+struct ConstraintForces {
+  Eigen::Matrix3Xd strain;  // N m, per strain row: at the start of the step, one and two steps before
+  Eigen::Matrix3Xd place;   // N, per place row at the start: a first guess only
+};
+
+// What the last step left behind, for reactions: rows and shapes as below.
+struct ProjectionMemory {
+  Eigen::VectorXd strain_multipliers;
+  Eigen::Matrix3Xd place_multipliers, strain_impulses;
+};
+
+//   (1) fixed control points don't move;
+//   (2) linear momentum is kept where nothing is pinned;
+//   (3) pattern analysed once, in the constructor;
+//   (4) a strain row that touches only fixed control points takes no part and counts in no violation.
+class ConstraintSolver {
+ public:
+  virtual ~ConstraintSolver() = default;
+
+  // Corrects x (free nodes) at time t onto the constraints, all rows hard.
+  virtual ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) = 0;
+  // The same for the candidate x of a step from the state `start` at t - dt; `forces` at its start become those at t,
+  // unless the solver needs none.
+  virtual ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>& start,
+                                double dt, ConstraintForces& forces) = 0;
+  // How far x is from the constraints, nothing moved.
+  virtual ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) = 0;
+  // Energy [J] that the constraints store at x; 0 where they are hard.
+  virtual double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) = 0;
+
+  // Multipliers of the last step, per row [kg m2 for strain rows, kg m for place rows]: divided by dt^2 they are the
+  // constraint forces' quadrature weights [N m, N].
+  virtual const Eigen::VectorXd& strain_multipliers() const = 0;
+  virtual const Eigen::Matrix3Xd& place_multipliers() const = 0;
+  // Multiplier times direction, summed over the iterations [kg m]: control point I was pushed by -d_I times its column.
+  virtual const Eigen::Matrix3Xd& strain_impulses() const = 0;
+  // All three, and putting them back where a run is taken up again; false where their sizes are of other rows.
+  virtual ProjectionMemory memory() const = 0;
+  virtual bool restore(const ProjectionMemory& memory) = 0;
+
+  virtual const ConstraintRows& rows() const = 0;
+  virtual std::size_t factor_nonzeros() const = 0;
+};
+
+}  // namespace toile
