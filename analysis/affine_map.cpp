@@ -79,14 +79,23 @@ Matrix AffineMap::identity(int control_points) {
 }
 
 Eigen::Matrix3Xd AffineMap::fixed_places(double t) const {
-  Eigen::Matrix3Xd places(3, fixed_.size());
-  for (std::size_t k = 0; k < fixed_.size(); ++k) places.col(k) = motion_(k, t);
+  Eigen::Matrix3Xd places;
+  fixed_places(t, places);
   return places;
 }
 
+void AffineMap::fixed_places(double t, Eigen::Matrix3Xd& places) const {
+  places.resize(3, static_cast<Eigen::Index>(fixed_.size()));
+  for (std::size_t k = 0; k < fixed_.size(); ++k) places.col(k) = motion_(k, t);
+}
+
 void AffineMap::expand(const Eigen::Ref<const Eigen::VectorXd>& x, double t, Eigen::Ref<Eigen::VectorXd> q) const {
+  expand(x, fixed_places(t), q);
+}
+
+void AffineMap::expand(const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Matrix3Xd& places,
+                       Eigen::Ref<Eigen::VectorXd> q) const {
   assert(x.size() == 3 * nodes() && q.size() == 3 * control_points());
-  const Eigen::Matrix3Xd places = fixed_places(t);
   for (int i = 0; i < control_points(); ++i) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (Matrix::InnerIterator e(free_, i); e; ++e) sum += e.value() * x.segment<3>(3 * e.col());

@@ -32,8 +32,13 @@ class AffineMap {
   const std::vector<int>& fixed() const { return fixed_; }
   const std::vector<int>& node_control_point() const { return node_control_point_; }  // control point that node k is
   Eigen::Matrix3Xd fixed_places(double t) const;
+  void fixed_places(double t,
+                    Eigen::Matrix3Xd& places) const;  // into memory that has the size already: allocates nothing
 
   void expand(const Eigen::Ref<const Eigen::VectorXd>& x, double t, Eigen::Ref<Eigen::VectorXd> q) const;
+  // The same with the places of the fixed control points at hand; allocates nothing.
+  void expand(const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Matrix3Xd& fixed_places,
+              Eigen::Ref<Eigen::VectorXd> q) const;
   // T^T f for forces and other dual quantities (3 n_q -> 3 n_x), and for nodal scalars such as masses (n_q -> n_x).
   void reduce(const Eigen::Ref<const Eigen::VectorXd>& f, Eigen::Ref<Eigen::VectorXd> fx) const;
   Eigen::VectorXd reduce_scalar(const Eigen::Ref<const Eigen::VectorXd>& m) const;

@@ -358,12 +358,15 @@ Build build(Scene scene) {
   const Eigen::VectorXd nodes = free.restrict(result.start);
   free.expand(nodes, 0, result.start);
 
+  // On the way to rest there is no drag but what the wind does to cloth that stands still.
   Loads& loads = result.loads;
   loads.wind = result.scene.wind;
   loads.force.resize(3 * count);
   for (int i = 0; i < count; ++i) {
     loads.force.segment<3>(3 * i) = result.model->lumped_mass()[i] * result.scene.gravity;
+    if (result.scene.rest) loads.force.segment<3>(3 * i) += result.model->lumped_drag()[i] * loads.wind;
   }
+  if (result.scene.rest) loads.wind.setZero();
   for (std::size_t t = 0; t < result.scene.tractions.size(); ++t) {
     const SceneTraction& traction = result.scene.tractions[t];
     const int k = result.panel(traction.panel);

@@ -16,7 +16,7 @@ namespace toile {
 namespace {
 
 constexpr std::string_view first_word = "toile checkpoint ";
-constexpr int format_number = 1;  // raise it when the meaning of a byte changes
+constexpr int format_number = 2;  // raise it when the meaning of a byte changes
 
 // Every step can be undone, so that a change of any one word always shows in the end.
 std::uint64_t checksum(std::string_view bytes) {
@@ -44,7 +44,7 @@ void fields(auto& archive, Like<ConstraintForces> auto& f) {
   archive(f.strain, f.place);
 }
 void fields(auto& archive, Like<DynamicState> auto& s) {
-  archive(s.t, s.x, s.v, s.a, s.constraint);
+  archive(s.t, s.x, s.v, s.a, s.constraint, s.q, s.f);
 }
 void fields(auto& archive, Like<LoopState> auto& s) {
   archive(s.assembled, s.done, s.dt_scale, s.steps_since_bound, s.scale, s.balance, s.rounding, s.kick);
@@ -62,9 +62,14 @@ void fields(auto& archive, Like<EnergyBalance> auto& e) {
 void fields(auto& archive, Like<ProjectionReport> auto& r) {
   archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);
 }
+void fields(auto& archive, Like<Relaxation> auto& r) {
+  archive(r.steps, r.halts, r.trials, r.remaining, r.dt_share, r.trial, r.length, r.count, r.moved, r.kinetic,
+          r.halts_before, r.from);
+}
 void fields(auto& archive, Like<RunState> auto& s) {
-  archive(s.state, s.loop, s.frames, s.steps, s.redone_steps, s.frame_times, s.dt_min, s.dt_max, s.dt_last, s.bound,
-          s.energy, s.iterations_sum, s.iterations_max, s.unconverged_steps, s.last_projection, s.warnings);
+  archive(s.state, s.loop, s.relaxing, s.relaxation, s.frames, s.steps, s.redone_steps, s.frame_times, s.dt_min,
+          s.dt_max, s.dt_last, s.bound, s.energy, s.iterations_sum, s.iterations_max, s.unconverged_steps,
+          s.last_projection, s.warnings);
 }
 void fields(auto& archive, Like<SceneMark> auto& s) {
   archive(s.keys, s.control_points);
@@ -190,7 +195,8 @@ std::string difference(const SceneMark& then, const SceneMark& now, const std::s
 SceneMark scene_mark(const Build& build) {
   SceneMark mark;
   for (const auto& [key, value] : build.scene.keys) {
-    if (key == "solver.until" || key == "solver.time_limit" || key == "output" || key.starts_with("output.")) continue;
+    const bool of_the_end = key == "solver.until" || key == "solver.time_limit" || key.starts_with("solver.rest");
+    if (of_the_end || key == "output" || key.starts_with("output.")) continue;
     mark.keys[key] = value;
   }
   for (std::size_t k = 0; k < build.scene.panels.size(); ++k) {
@@ -253,8 +259,10 @@ RunResult parse_checkpoint(std::string_view bytes, const std::string& name, cons
   if (system.projection) reader(memory);
   const Eigen::Index unknowns = 3 * system.map->nodes();
   const DynamicState& s = state.state;
+  const Eigen::Index numbers = 3 * system.map->control_points();
   const bool fits = reader.at_end() && s.x.size() == unknowns && s.v.size() == unknowns && s.a.size() == unknowns &&
-                    std::isfinite(s.t) && s.x.allFinite() && s.v.allFinite() && s.a.allFinite() &&
+                    s.q.size() == numbers && s.f.size() == numbers && std::isfinite(s.t) && s.x.allFinite() &&
+                    s.v.allFinite() && s.a.allFinite() && s.q.allFinite() && s.f.allFinite() &&
                     state.frames == static_cast<int>(state.frame_times.size()) &&
                     state.last_projection.worst_row < system.strain_rows;
   if (!fits || (system.projection && !system.projection->restore(memory))) {

@@ -15,7 +15,7 @@ namespace toile {
 // version, the keys of the scene with the contents of its files, and the run.
 //   (1) read back, `run` goes on with the same bits;
 //   (2) a file that is cut short or has a changed byte, of another version, or of a scene that differs in more than
-//       [output], until and time_limit, is refused with what differs.
+//       [output], until, rest and time_limit, is refused with what differs.
 struct SceneMark {
   std::map<std::string, std::string> keys;  // that change what the cloth does; contents in place of file names
   std::uint64_t control_points = 0;         // other programs may make others of the same files

@@ -158,6 +158,10 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
         << std::flush;
   };
   hooks.progress = [&](const RunProgress& p) {
+    if (built.scene.rest) {
+      console.live(fmt::format("until rest: t = {:.3f} s  step {} of {:.2g} s", p.time, p.steps, p.dt));
+      return;
+    }
     const double gone = p.time - start_time;
     console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {} left", 100 * p.time / p.until,
                              p.time, p.until, p.steps, p.dt, duration(since(start) * (p.until - p.time) / gone)));
@@ -200,6 +204,11 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   console.note(fmt::format("{}: {:.3g} s in {} frames, {} steps of {:.2g} to {:.2g} s, {:.2f} s of wall time",
                            built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,
                            result.wall_seconds));
+  if (built.scene.rest && result.exit == RunExit::ok) {
+    console.note(
+        fmt::format("  at rest after {} steps: let go for half of them, no point swings by more than {:.2g} m",
+                    result.relaxation.steps, result.relaxation.remaining));
+  }
   console.note(
       fmt::format("  strain at most {:.2g} weft, {:.2g} warp; mean {:.2g}, {:.2g}; at constraint points {:.2g}",
                   measures.strain.max[0], measures.strain.max[1], measures.strain.mean_abs[0],
@@ -219,16 +228,18 @@ int dry_run(Scene scene, bool json, Console& console) {
   TimeStepBound bound = time_step_bound(*built.model, *system->map, system->dynamic.node_mass, built.start);
   const double dt = planned_step(built.scene, bound);
   long long steps = 0;
-  const std::vector<double> times = frame_times(built.scene);
+  std::vector<double> times;  // of a run until rest nobody knows
+  if (!built.scene.rest) times = frame_times(built.scene);
   for (std::size_t k = 1; k < times.size(); ++k) {
     steps += static_cast<long long>(std::ceil((times[k] - times[k - 1]) / dt * (1 - 1e-9)));
   }
   // A few steps, timed, on a copy of the start.
   DynamicState state = state_from(*system, built.start, Eigen::VectorXd::Zero(built.start.size()), 0);
-  const int trial = static_cast<int>(std::min(5LL, steps));
+  const int trial = built.scene.rest ? 5 : static_cast<int>(std::min(5LL, steps));
   const Clock::time_point start = Clock::now();
-  for (int k = 0; k < trial; ++k) step(system->dynamic, state, dt);
-  const double seconds = trial > 0 ? since(start) / trial * static_cast<double>(steps) : 0;
+  StepWork work;
+  for (int k = 0; k < trial; ++k) step(system->dynamic, state, dt, work);
+  const double per_step = trial > 0 ? since(start) / trial : 0;
   const std::size_t factor = system->projection ? system->projection->factor_nonzeros() : 0;
   const double bytes =
       static_cast<double>(built.model->table_bytes() + 8 * factor) + 8.0 * 30 * static_cast<double>(built.start.size());
@@ -241,9 +252,12 @@ int dry_run(Scene scene, bool json, Console& console) {
     out["limited_by"] = {{"panel", built.panels[static_cast<std::size_t>(bound.cell.panel)].name},
                          {"cell", {bound.cell.i, bound.cell.j}},
                          {"stiffness", bound.bending ? "bending" : "membrane"}};
-    out["steps"] = steps;
-    out["frames"] = times.size();
-    out["estimated_seconds"] = seconds;
+    if (!built.scene.rest) {
+      out["steps"] = steps;
+      out["frames"] = times.size();
+      out["estimated_seconds"] = per_step * static_cast<double>(steps);
+    }
+    out["seconds_per_step"] = per_step;
     out["estimated_bytes"] = bytes;
     out["control_points"] = built.model->control_point_count();
     out["degrees_of_freedom"] = 3 * system->map->nodes();
@@ -257,8 +271,14 @@ int dry_run(Scene scene, bool json, Console& console) {
   fmt::print("step       {:.4g} s{}\n", dt, built.scene.dt ? " (as the scene says)" : "");
   fmt::print("limited by {} in {}: stable below {:.4g} s\n", bound.bending ? "bending" : "membrane stiffness",
              describe_cell(built, bound.cell), bound.dt);
-  fmt::print("steps      {} for {} frames up to {} s\n", steps, times.size(), built.scene.until);
-  fmt::print("time       about {:.2g} s, without frames\n", seconds);
+  if (built.scene.rest) {
+    fmt::print("steps      until no point swings by more than {:.3g} m when let go, {} at most\n",
+               rest_tolerance(built), built.scene.rest->max_steps);
+    fmt::print("time       about {:.2g} s a step, without frames\n", per_step);
+  } else {
+    fmt::print("steps      {} for {} frames up to {} s\n", steps, times.size(), built.scene.until);
+    fmt::print("time       about {:.2g} s, without frames\n", per_step * static_cast<double>(steps));
+  }
   fmt::print("memory     about {:.2g} MB\n", bytes / 1e6);
   fmt::print("unknowns   {} of {} control points\n", 3 * system->map->nodes(), built.model->control_point_count());
   fmt::print("rows       {} of strain, {} of pins\n", system->strain_rows, 3 * system->place_rows);

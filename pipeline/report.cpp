@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/output.h"
@@ -75,6 +76,13 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["steps"] = run.steps;
   report["redone_steps"] = run.redone_steps;
   report["simulated_seconds"] = run.time;
+  if (scene.rest) {
+    const Relaxation& r = run.relaxation;
+    report["rest"] = {
+        {"steps", r.steps}, {"halts", r.halts}, {"trials", r.trials}, {"tolerance", rest_tolerance(build)}};
+    // Left out where nothing can be said yet.
+    if (std::isfinite(r.remaining)) report["rest"]["remaining"] = r.remaining;
+  }
   const double computing = run.wall_seconds - run.frame_seconds;
   report["wall_seconds"] = computing;
   report["wall_seconds_per_frame"] = run.time > run.from ? computing / ((run.time - run.from) * 30) : 0.0;

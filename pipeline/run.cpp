@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "geometry/error.h"
 
@@ -23,6 +22,7 @@ constexpr int steps_per_bound = 100;  // the bound costs some 40 forces
 // A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the
 // plan.
 constexpr double damped_scale = 0.8, smallest_damped = 0.25;
+constexpr double rest_share = 1e-4;                   // of the largest panel, of the tolerance of rest
 constexpr double smallest_scale = 1.0 / 1024;         // ten halvings of the planned step
 constexpr double step_rise = 0.05, total_rise = 0.2;  // of the energy turned over
 
@@ -38,7 +38,7 @@ class Loop {
  public:
   // Without a system, `from` is a run that has yet to begin.
   Loop(const Build& build, RunResult from, const RunHooks& hooks)
-      : build_(build), scene_(build.scene), hooks_(hooks), frame_times_(frame_times(scene_)), result_(std::move(from)) {
+      : build_(build), scene_(build.scene), hooks_(hooks), result_(std::move(from)) {
     result_.from = result_.state.t;
     result_.allocations.known = static_cast<bool>(hooks.allocations);
   }
@@ -46,19 +46,28 @@ class Loop {
   RunResult operator()() {
     if (result_.system) {
       require_time_left(build_, result_);
+      // The forces of a run with another kind of end are others.
+      if (result_.relaxing != scene_.rest.has_value()) initialise(result_.system->dynamic, result_.state);
     } else {
       begin();
       emit_frame();
       finish_target(0);
     }
-    for (const double target : targets()) {
-      while (result_.exit == RunExit::ok && result_.state.t < target) advance(target);
+    result_.relaxing = scene_.rest.has_value();
+    while (const auto target = next_target()) {
+      while (result_.exit == RunExit::ok && result_.state.t < *target && !over()) advance(*target);
       if (result_.exit != RunExit::ok) break;
-      release(target);
-      if (is_frame(target)) emit_frame();
-      finish_target(target);
+      if (result_.state.t < *target) {
+        if (result_.loop.done < result_.state.t) emit_frame();
+        finish_target(result_.state.t);
+        break;
+      }
+      release(*target);
+      if (*target == next_frame()) emit_frame();
+      finish_target(*target);
     }
     if (result_.exit == RunExit::ok && !result_.last_projection.converged) report_limit();
+    if (result_.exit == RunExit::ok && scene_.rest && !at_rest()) report_unrest();
     result_.time = result_.state.t;
     const Eigen::VectorXd moved = control_points(*result_.system, result_.state) - build_.start;
     result_.energy.gravity = 0;
@@ -98,16 +107,37 @@ class Loop {
     resumable();
   }
 
-  // Times that steps land on, from here on.
-  std::vector<double> targets() const {
-    std::set<double> times(frame_times_.begin(), frame_times_.end());
-    for (const ScenePin& pin : scene_.pins) {
-      if (pin.release && *pin.release > 0 && *pin.release < scene_.until) times.insert(*pin.release);
-    }
-    std::erase_if(times, [&](double t) { return t <= result_.loop.done || t < result_.state.t; });
-    return {times.begin(), times.end()};
+  // Not dealt with yet.
+  bool open(double t) const { return t > result_.loop.done && t >= result_.state.t; }
+  // The next frame that has a time beforehand; none after the end.
+  std::optional<double> next_frame() const {
+    if (!open(scene_.until)) return std::nullopt;
+    double k = std::max(0.0, std::floor(result_.state.t / scene_.every) - 1);
+    while (!open(k * scene_.every)) ++k;
+    const double t = k * scene_.every;
+    return t < scene_.until * (1 - 1e-9) ? t : scene_.until;
   }
-  bool is_frame(double t) const { return std::ranges::binary_search(frame_times_, t); }
+  // The next time that steps land on.
+  std::optional<double> next_target() const {
+    std::optional<double> next = next_frame();
+    for (const ScenePin& pin : scene_.pins) {
+      if (next && pin.release && *pin.release > 0 && open(*pin.release)) next = std::min(*next, *pin.release);
+    }
+    return next;
+  }
+
+  bool at_rest() const { return scene_.rest && result_.relaxation.remaining <= tolerance_; }
+  // Before its time: at rest, or at the end of the steps that it may take to get there.
+  bool over() const { return at_rest() || (scene_.rest && result_.relaxation.steps >= scene_.rest->max_steps); }
+  // When pins no longer move and are no longer let go.
+  double pins_done() const {
+    double t = 0;
+    for (const ScenePin& pin : scene_.pins) {
+      if (pin.move) t = std::max(t, pin.release ? std::min(*pin.release, pin.move->end) : pin.move->end);
+      if (pin.release) t = std::max(t, *pin.release);
+    }
+    return t;
+  }
 
   void evaluate_bound() {
     result_.loop.steps_since_bound = 0;
@@ -130,7 +160,8 @@ class Loop {
   }
   void advance(double target) {
     if (result_.loop.steps_since_bound >= steps_per_bound) evaluate_bound();
-    const double largest = result_.loop.dt_scale * planned_step(scene_, result_.bound);
+    double largest = result_.loop.dt_scale * planned_step(scene_, result_.bound);
+    if (!scene_.dt) largest *= result_.relaxation.dt_share;
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
     const double count = std::max(1.0, std::ceil(left / largest * (1 - 1e-9)));
@@ -142,20 +173,20 @@ class Loop {
     }
     for (bool halved = false;; halved = true) {
       const long asked = allocations();
-      before_ = result_.state;
-      const StepReport report = step(result_.system->dynamic, result_.state, dt);
+      const StepReport report = step(result_.system->dynamic, result_.state, dt, work_);
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
       result_.allocations.steps += allocations() - asked;
       const std::string trouble = judge(report);
       if (trouble.empty()) {
         accept(report);
+        if (scene_.rest) relax_after(report);
         // The last step of a stretch ends on the target itself, not on a rounded sum.
         if (count == 1 && !halved) result_.state.t = target;
         if (halved) result_.loop.steps_since_bound = 0;
         break;
       }
-      std::swap(result_.state, before_);
+      if (report.finite) std::swap(result_.state, work_.other);
       if (!halved) result_.accepted = RunState(result_);
       ++result_.redone_steps;
       if (result_.loop.dt_scale <= smallest_scale) {
@@ -170,10 +201,31 @@ class Loop {
     resumable();
     if (hooks_.stop) result_.exit = hooks_.stop();
     if (result_.exit != RunExit::ok) {
-      result_.reason = fmt::format("{} at t = {:.6g} s of {:.6g} s",
-                                   result_.exit == RunExit::time_limit ? "stopped by the time limit" : "interrupted",
-                                   result_.state.t, scene_.until);
+      const char* why = result_.exit == RunExit::time_limit ? "stopped by the time limit" : "interrupted";
+      result_.reason = scene_.rest ? fmt::format("{} after {} steps, {}", why, result_.relaxation.steps, unrest())
+                                   : fmt::format("{} at t = {:.6g} s of {:.6g} s", why, result_.state.t, scene_.until);
     }
+  }
+
+  void relax_after(const StepReport& report) {
+    Relaxation& relaxation = result_.relaxation;
+    if (relax(result_.system->dynamic, work_, report, tolerance_, result_.state, relaxation)) {
+      result_.energy.kinetic = 0;
+      result_.loop.balance -= report.kinetic;
+    }
+    if (result_.state.t < pins_done_) restart(relaxation);
+  }
+  std::string unrest() const {
+    const double left = result_.relaxation.remaining;
+    return std::isfinite(left) ? fmt::format("some point still swings by {:.3g} m when let go", left)
+                               : "the cloth is still on its way";
+  }
+  void report_unrest() {
+    result_.exit = RunExit::check_failed;
+    result_.reason = fmt::format(
+        "not at rest after {} steps: {}, allowed is {:.3g} m. Resume with a larger "
+        "solver.rest.max_steps or solver.rest.tolerance",
+        result_.relaxation.steps, unrest(), tolerance_);
   }
 
   // Less than what ends a run, but more than a stable one should gain.
@@ -337,9 +389,10 @@ class Loop {
   const Build& build_;
   const Scene& scene_;
   const RunHooks& hooks_;
-  std::vector<double> frame_times_;
   RunResult result_;
-  DynamicState before_;  // the last step
+  const double tolerance_ = rest_tolerance(build_);
+  const double pins_done_ = pins_done();
+  StepWork work_;
   const Clock::time_point start_ = Clock::now();
 };
 
@@ -359,6 +412,14 @@ const char* name(RunExit exit) {
       return "time_limit";
   }
   return "";
+}
+
+double rest_tolerance(const Build& build) {
+  if (!build.scene.rest) return 0;
+  if (build.scene.rest->tolerance) return *build.scene.rest->tolerance;
+  double largest = 0;
+  for (const ShellPanel& panel : build.model->panels()) largest = std::max(largest, extent(panel));
+  return rest_share * largest;
 }
 
 std::vector<double> frame_times(const Scene& scene) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/dynamics/relaxation.h"
 #include "analysis/dynamics/time_step.h"
 #include "pipeline/system.h"
 
@@ -65,6 +66,8 @@ struct AllocationCounts {
 struct RunState {
   DynamicState state;
   LoopState loop;
+  bool relaxing = false;  // on the way to rest: without drag
+  Relaxation relaxation;
   int frames = 0, steps = 0, redone_steps = 0;
   std::vector<double> frame_times;  // s, of the frames so far
   double dt_min = 0, dt_max = 0, dt_last = 0;
@@ -98,6 +101,9 @@ struct RunHooks {
   std::function<RunExit()> stop;  // asked after each step, so that every run gets ahead; not ok: finish now with this
 };
 
+// So far may material points swing when let go at the end of a run until rest [m].
+double rest_tolerance(const Build& build);
+
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
 // state, evaluated anew every 100 steps; where the projection had to damp, less.
 //   (1) every number of an accepted step is finite;
@@ -107,6 +113,9 @@ struct RunHooks {
 //       unstable step soon does.
 //       A step that breaks this is redone with half the step; the planned step is halved ten times at most, then the
 //       run ends as solver_failed at the last accepted state.
+// Until rest: without drag, halted at each peak of the kinetic energy; time is that of no real motion. Once all motions
+// and releases of pins are over, the run ends where `Relaxation::remaining` is within rest_tolerance(), with a frame of
+// its own, or as check_failed after max_steps.
 // The step is deterministic: no decision depends on time of day, addresses or thread count.
 RunResult run(const Build& build, const RunHooks& hooks = {});
 
@@ -115,7 +124,7 @@ RunResult run(const Build& build, const RunHooks& hooks = {});
 RunResult run(const Build& build, RunResult from, const RunHooks& hooks = {});
 void require_time_left(const Build& build, const RunState& state);
 
-// The first system and its step bound, for a dry run. Times of the frames of a scene.
+// For a dry run: times of the frames of a scene with an end.
 std::vector<double> frame_times(const Scene& scene);
 double planned_step(const Scene& scene, const TimeStepBound& bound);
 

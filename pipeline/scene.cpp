@@ -7,6 +7,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "geometry/error.h"
@@ -470,9 +471,17 @@ void read_solver(Table table, Scene& scene) {
   }
   if (const toml::node* node = table.find("until")) {
     if (node->is_string() && *node->value<std::string>() == "rest") {
-      table.fail(*node, "until = \"rest\" is not supported by this version; give a time such as \"1 s\"");
+      scene.rest.emplace();
+      scene.until = std::numeric_limits<double>::infinity();
+    } else {
+      scene.until = table.quantity(*node, "until in [solver]", dimension::time, Range::positive);
     }
-    scene.until = table.quantity(*node, "until in [solver]", dimension::time, Range::positive);
+  }
+  if (auto rest = table.table("rest", "rest in [solver]")) {
+    if (!scene.rest) table.fail(*table.raw().get("rest"), "rest in [solver] belongs to until = \"rest\"");
+    scene.rest->tolerance = rest->number("tolerance", dimension::length, Range::positive);
+    if (const auto n = rest->integer("max_steps", 1, 1000000000)) scene.rest->max_steps = *n;
+    rest->done();
   }
   scene.time_limit = table.number("time_limit", dimension::time, Range::positive);
   table.done();
@@ -488,7 +497,7 @@ void read_settings(Table& top, Scene& scene) {
   }
   if (auto table = top.table("solver", "[solver]")) read_solver(*table, scene);
   if (auto table = top.table("output", "[output]")) read_output(*table, scene);
-  if (scene.until / scene.every > 1e6) {
+  if (!scene.rest && scene.until / scene.every > 1e6) {
     throw InputError(fmt::format("{}: until = {} s with a frame every {} s would be more than a million frames",
                                  scene.path.string(), scene.until, scene.every));
   }
@@ -511,6 +520,19 @@ void snap_releases(Scene& scene) {
       }
     }
     releases.push_back(t);
+  }
+}
+
+// Cloth that falls for ever has no rest.
+void require_pins_for_rest(const Scene& scene) {
+  if (!scene.rest) return;
+  for (const ScenePanel& panel : scene.panels) {
+    const auto holds = [&](const ScenePin& pin) { return pin.panel == panel.name && !pin.release; };
+    const auto pulls = [&](const SceneTraction& traction) { return traction.panel == panel.name; };
+    if (std::ranges::any_of(scene.pins, holds)) continue;
+    if (scene.gravity.isZero(0) && scene.wind.isZero(0) && std::ranges::none_of(scene.tractions, pulls)) continue;
+    throw InputError(
+        fmt::format("{}: until = \"rest\", but no pin holds panel '{}' for good", panel.where, panel.name));
   }
 }
 
@@ -553,6 +575,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   for (Table& table : top.tables("obstacle", "[[obstacle]]")) scene.obstacles.push_back(read_obstacle(table, path));
   read_settings(top, scene);
   snap_releases(scene);
+  require_pins_for_rest(scene);
   top.done();
   list_keys(root, "", scene.keys);
   return scene;
@@ -637,6 +660,7 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
   for (const std::string& setting : settings) assign(root, setting);
   Table top(root, "the scene", "--set");
   read_settings(top, scene);
+  require_pins_for_rest(scene);
   top.done();
   for (std::size_t k = 0; k < request.pins.size(); ++k) {
     scene.keys.emplace_back(fmt::format("--pin {}", k), request.pins[k]);

@@ -98,6 +98,12 @@ struct StrainLimit {
   int max_iterations = 50;
 };
 
+// until = "rest": static equilibrium.
+struct SceneRest {
+  std::optional<double> tolerance;  // m that material points may swing when let go; unset: 1e-4 of the largest panel
+  int max_steps = 1000000;
+};
+
 struct OutputPoint {
   std::string panel;
   Eigen::Vector2d uv{0, 0};
@@ -119,7 +125,8 @@ struct Scene {
   Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
   Eigen::Vector3d wind{0, 0, 0};         // m/s
   std::optional<double> dt;              // s; unset: chosen from the eigenvalue bound
-  double until = 1;                      // s
+  double until = 1;                      // s; infinite where `rest` ends the run
+  std::optional<SceneRest> rest;         // set: until the cloth is at rest
   std::optional<double> time_limit;      // s of wall time for the program; unset: none
   double every = 1.0 / 30;               // s between frames
   std::vector<FrameFormat> formats{FrameFormat::vtu};

@@ -117,7 +117,6 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
 
 }  // namespace
 
-// Edge of the square whose corners are as far from its middle as the farthest cloth is [m].
 double extent(const ShellPanel& panel) {
   Eigen::Matrix3Xd places(3, panel.quadrature.points.size());
   for (Eigen::Index k = 0; k < places.cols(); ++k) {
@@ -245,7 +244,7 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     double& mass = dynamic.node_mass[static_cast<Eigen::Index>(k)];
     mass = std::max(mass, build.mass_floor[nodes[k]]);
     double& drag = dynamic.node_drag[static_cast<Eigen::Index>(k)];
-    drag = std::max(drag, 0.0);
+    drag = scene.rest ? 0 : std::max(drag, 0.0);
   }
 
   ConstraintRows rows;

@@ -24,6 +24,9 @@ struct System {
   DynamicSystem dynamic;
 };
 
+// Edge of the square whose corners are as far from its middle as the farthest cloth is [m].
+double extent(const ShellPanel& panel);
+
 // Stiffness of the strain limit of a panel [N/m]: the scene's, else one that strains by a tenth of the narrowest limit
 // under the panel's whole weight or the largest traction, and is at least ten times the fabric's own.
 double limit_stiffness(const Build& build, int panel);

@@ -9,12 +9,14 @@
 
 namespace toile {
 
-// Free nodes: places, velocities, accelerations at one time; forces of the constraints up to then. Restartable bit by
-// bit.
+// Free nodes: places, velocities, accelerations at one time; forces of the constraints up to then; and what follows
+// from the places, so that no step works it out twice: control points and the force on them, without the constraints'.
+// Restartable bit by bit.
 struct DynamicState {
   double t = 0;
   Eigen::VectorXd x, v, a;
   ConstraintForces constraint;
+  Eigen::VectorXd q, f;  // [m], [N]; 3 n
 };
 
 // Dead loads on control points [N], 3 n: gravity on the true mass and tractions; wind [m/s] acts through drag.
@@ -50,14 +52,21 @@ struct DynamicSystem {
   ConstraintSolver* projection = nullptr;  // null: no limits and no place rows
 };
 
-// Accelerations (and nothing else) from places and velocities: for the start and after a change of the system.
+// Accelerations, control points and forces from places and velocities: for the start and after a change of the system.
 void initialise(const DynamicSystem& system, DynamicState& state);
 
 // Advances state by dt. The velocity between the steps is (x_n+1 - x_n) / dt after projection; drag is implicit.
 //   x~ = x + dt v + dt^2/2 a, projected at t + dt;  v_half = (x_n+1 - x_n) / dt
 //   M a + C (v_half + dt/2 (a + a_c) - wind) = T^T (f_int + f_ext) at n+1;  v = v_half + dt/2 a
 // with the constraints' acceleration a_c of the step: drag sees the velocity that the constraints allow.
-// A step that ends in non-finite numbers leaves `state` as it was and says so.
+// A step that ends in non-finite numbers leaves `state` as it was and says so. With `work` from an earlier step of the
+// same system nothing is allocated but by the projection.
+struct StepWork {
+  DynamicState other;  // after a finite step: the state before it, which a swap brings back
+  Eigen::VectorXd candidate, move, constraint, force;
+  Eigen::Matrix3Xd fixed_places, place_force;
+};
+StepReport step(const DynamicSystem& system, DynamicState& state, double dt, StepWork& work);
 StepReport step(const DynamicSystem& system, DynamicState& state, double dt);
 
 // Force that each fixed control point and each place row exerts on the cloth [N] at the state's time, dt being the last

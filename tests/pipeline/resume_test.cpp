@@ -144,6 +144,21 @@ TEST(Resume, AHalvedStepIsTakenUpAsItWas) {
   }
 }
 
+// Halts, trials and the windows in between.
+TEST(Resume, ARunUntilRestEndsWithTheSameBytes) {
+  const Folder folder("resume_rest");
+  const Build b = built(folder, busy_scene(), test::trimmed_sheet("cloth"),
+                        {"solver.until=rest", "solver.rest.tolerance=1 mm", "output.every=0.1"});
+  const Whole whole = whole_run(b);
+  ASSERT_EQ(whole.result.exit, RunExit::ok) << whole.result.reason;
+  const std::size_t count = whole.checkpoints.size();
+  ASSERT_GT(whole.result.relaxation.trials, 0);
+  for (std::size_t k = 0; k < count; k += 1 + count / 12)
+    expect_same_end(resumed_run(b, whole.checkpoints[k]), whole.left, "place " + std::to_string(k));
+  for (const std::size_t k : {count - 3, count - 2, count - 1})
+    expect_same_end(resumed_run(b, whole.checkpoints[k]), whole.left, "place " + std::to_string(k));
+}
+
 TEST(Resume, AFailedRunFailsAgainFromItsLastGoodState) {
   const Folder folder("resume_failed");
   const Build b = rash(folder, "40", "400");

@@ -167,7 +167,6 @@ TEST(Scene, LaterFeaturesAreRefusedByName) {
   expect_message(11, "points = \"greville\"", {"not supported by this version", "knot-mesh"});
   expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});
   expect_message(15, "scheme = \"newmark\"", {"not supported by this version", "verlet"});
-  expect_message(15, "until = \"rest\"", {"not supported by this version"});
   expect_message(12, "[[contact_pair]]", {"[[contact_pair]] is not supported by this version"});
 }
 

@@ -1,0 +1,176 @@
+// Runs until rest, against shapes that are known otherwise.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "geometry/error.h"
+#include "pipeline/checkpoint.h"
+#include "pipeline/measures.h"
+#include "pipeline/output.h"
+#include "pipeline/panels.h"
+#include "pipeline/run.h"
+
+namespace toile {
+namespace {
+
+using test::Folder;
+
+struct Ended {
+  RunResult run;
+  std::vector<Eigen::Vector3d> points;
+  nlohmann::ordered_json report;
+};
+
+Ended end_of(const Build& b) {
+  Ended e{run(b), {}, {}};
+  const StateMeasures m = measure(b, *e.run.system, e.run.state, e.run.dt_last);
+  e.points = m.points;
+  e.report = report_json(b, e.run, m, 0);
+  return e;
+}
+
+Build sample(const std::string& scene, std::vector<std::string> settings) {
+  for (const char* s : {"output.formats=[]", "output.preview=false"}) settings.emplace_back(s);
+  return build(read_scene(std::string(TOILE_SAMPLES "/") + scene, settings));
+}
+
+// The exact tip is that of samples/studies/cantilever/elastica.csv; cubic strips are within 1 % of the length.
+TEST(Rest, AClampedStripEndsAsTheHeavyElastica) {
+  for (const auto& [b0, along, drop] :
+       {std::tuple("7.848e-3", 0.991246, 0.123471), std::tuple("7.848e-4", 0.656354, 0.700200)}) {
+    const Ended e =
+        end_of(sample("studies/cantilever/scene.toml",
+                      {"panel.0.refine={degree=3,spans=[8,1]}", "solver.rest.tolerance=2e-5",
+                       std::string("fabric.strip.bending={kappa0=1e4,kappa_reg=1e4,twist=7.848e-4,b0=") + b0 + "}"}));
+    ASSERT_EQ(e.run.exit, RunExit::ok) << e.run.reason;
+    EXPECT_LT((e.points[0] - Eigen::Vector3d(0.2 * along, 0.01, -0.2 * drop)).norm(), 0.01 * 0.2);
+    EXPECT_LE(e.report["rest"]["remaining"], 2e-5);
+    EXPECT_EQ(e.run.energy.kinetic, 0);
+  }
+}
+
+// Drag takes twelve seconds to stop the swing; what is left then is far below a tenth of a millimetre.
+TEST(Rest, TheKidnappedClothEndsWhereDragLeavesIt) {
+  const Ended still = end_of(sample("kidnapped_a/scene.toml", {"solver.until=rest"}));
+  const Ended damped = end_of(sample("kidnapped_a/scene.toml", {"solver.until=12"}));
+  ASSERT_EQ(still.run.exit, RunExit::ok) << still.run.reason;
+  for (int k : {0, 1}) EXPECT_LT((still.points[k] - damped.points[k]).norm(), 1e-4);
+}
+
+// Frequent halts hold up the slow swing of the whole: the cloth hardly moves from window to window while its corner, by
+// symmetry at y = 0 in the end, is still 30 mm away.
+TEST(Rest, ASlowSwingIsNotTakenForRest) {
+  for (const char* pins : {"[{at='corner:0,0'},{at='corner:1,0'}]", "[{at='corner:0,0'}]"}) {
+    for (const double tolerance : {1e-2, 1e-3, 1e-4}) {
+      const Ended e = end_of(sample(
+          "kidnapped_a/scene.toml",
+          {"solver.until=rest", "solver.rest.tolerance=" + std::to_string(tolerance), std::string("pin=") + pins}));
+      ASSERT_EQ(e.run.exit, RunExit::ok) << e.run.reason;
+      EXPECT_LE(e.report["rest"]["remaining"], tolerance);
+      const bool one = std::string(pins).find("1,0") == std::string::npos;
+      // Held at one corner the diagonal hangs in the plane x = y and swings about the pin.
+      EXPECT_LT(one ? e.points[0].head<2>().norm() : std::abs(e.points[0].y()), tolerance) << pins;
+    }
+  }
+}
+
+const std::string hung =
+    "[[pin]]\nat = \"edge:v1\"\nmove = { translate = [0, 0, 0.02], end = 0.04 }\n"
+    "[[pin]]\nat = \"uv:200,100\"\nrelease = 0.03\n";
+
+Build small(const Folder& folder, std::vector<std::string> settings = {}, const std::string& pins = hung) {
+  test::write_panels(folder / "panel.igs", {test::sheet("cloth")});
+  settings.insert(settings.begin(), "solver.until=rest");
+  return build(parse_scene(test::scene_text(pins), folder / "scene.toml", settings));
+}
+
+TEST(Rest, IsJudgedAfterThePinsAreDone) {
+  const Folder folder("rest_pins");
+  const Build b = small(folder, {"output.every=0.02", "load.wind=[0,0,1]"});
+  std::vector<double> frames;
+  RunHooks hooks;
+  hooks.frame = [&](const RunFrame& frame) { frames.push_back(frame.time); };
+  const RunResult result = run(b, hooks);
+  ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+  EXPECT_GT(result.time, 0.04);
+  EXPECT_TRUE(result.system->place_rows == 0);
+  EXPECT_EQ(frames.back(), result.time);
+  EXPECT_TRUE(std::ranges::is_sorted(frames));
+  // The wind pulls at cloth that stands still: the pins carry it and the weight.
+  const StateMeasures m = measure(b, *result.system, result.state, result.dt_last);
+  const Fabric& fabric = b.scene.panels[0].fabric;
+  const double area = 0.16;
+  EXPECT_NEAR(m.reactions[0].z(), area * (9.81 * fabric.density - fabric.drag), 1e-3 * area * 9.81 * fabric.density);
+}
+
+TEST(Rest, ACapOnTheStepsEndsAsAFailedCheckAndCanBeResumed) {
+  const Folder folder("rest_cap");
+  const Build capped = small(folder, {"solver.rest.max_steps=120"});
+  std::string checkpoint;
+  RunHooks hooks;
+  hooks.resumable = [&](const RunResult& now) { checkpoint = format_checkpoint(scene_mark(capped), now, *now.system); };
+  const RunResult first = run(capped, hooks);
+  EXPECT_EQ(first.exit, RunExit::check_failed);
+  EXPECT_EQ(first.relaxation.steps, 120);
+  for (const char* part : {"not at rest after 120 steps", "solver.rest.max_steps"})
+    EXPECT_NE(first.reason.find(part), std::string::npos) << first.reason;
+  const Build b = small(folder);
+  const RunResult whole = run(b), rest = run(b, parse_checkpoint(checkpoint, "checkpoint", b));
+  ASSERT_EQ(whole.exit, RunExit::ok) << whole.reason;
+  EXPECT_EQ(rest.exit, RunExit::ok) << rest.reason;
+  EXPECT_LT(
+      (control_points(*rest.system, rest.state) - control_points(*whole.system, whole.state)).cwiseAbs().maxCoeff(),
+      2 * rest_tolerance(b));
+  EXPECT_EQ(run(b, parse_checkpoint(format_checkpoint(scene_mark(b), rest, *rest.system), "checkpoint", b)).steps,
+            rest.steps)
+      << "what is at rest stays";
+}
+
+TEST(Rest, ADynamicRunGoesOnToRest) {
+  const Folder folder("rest_after");
+  const Build moving = small(folder, {"solver.until=0.05", "load.wind=[0,0,1]"});
+  const RunResult first = run(moving);
+  const std::string checkpoint = format_checkpoint(scene_mark(moving), first, *first.system);
+  const Build b = small(folder, {"load.wind=[0,0,1]"});
+  const RunResult result = run(b, parse_checkpoint(checkpoint, "checkpoint", b)), whole = run(b);
+  ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+  EXPECT_LT(
+      (control_points(*result.system, result.state) - control_points(*whole.system, whole.state)).cwiseAbs().maxCoeff(),
+      2 * rest_tolerance(b));
+}
+
+TEST(Rest, ClothThatNothingHoldsIsRefused) {
+  const Folder folder("rest_refused");
+  const auto refusal = [&](const std::string& pins, std::vector<std::string> settings = {}) -> std::string {
+    try {
+      small(folder, settings, pins);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_NE(refusal("").find("no pin holds panel 'cloth' for good"), std::string::npos) << refusal("");
+  EXPECT_NE(refusal("[[pin]]\nat = \"edge:v1\"\nrelease = 3\n").find("for good"), std::string::npos);
+  EXPECT_EQ(refusal("", {"load.gravity=[0,0,0]"}), "accepted");
+  EXPECT_NE(refusal(hung, {"solver.rest.tolerence=1"}).find("did you mean 'tolerance'?"), std::string::npos);
+  EXPECT_NE(refusal(hung, {"solver.rest.tolerance=0"}).find("must be positive"), std::string::npos);
+  EXPECT_NE(refusal(hung, {"solver.rest.tolerance=1 mm", "solver.until=3"}).find("belongs to until"),
+            std::string::npos);
+}
+
+TEST(Rest, NothingMovesWithoutLoads) {
+  const Folder folder("rest_still");
+  for (const char* pins : {"", "[[pin]]\nat = \"box:[-1,-1,-1],[1,1,1]\"\n"}) {
+    const Build b = small(folder, {"load.gravity=[0,0,0]"}, pins);
+    const RunResult result = run(b);
+    EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
+    EXPECT_LT(result.steps, 200);
+    EXPECT_LT((control_points(*result.system, result.state) - b.start).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace toile
