@@ -144,7 +144,7 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
 }
 
 void FastProjection::Impl::begin(double t) {
-  fixed_places = map.fixed_places(t);
+  map.fixed_places(t, fixed_places);
   for (int p = 0; p < places(); ++p) targets.col(p) = rows.place[p].target(t);
   compliance.setZero();
   clear();
@@ -328,7 +328,7 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
                                       ConstraintForces& forces) {
   Impl& s = *impl_;
   if (s.options.variant == ProjectionVariant::paper) return project(x, t);
-  s.fixed_places = s.map.fixed_places(t - dt);
+  s.map.fixed_places(t - dt, s.fixed_places);
   evaluate(s.composed, start, s.fixed_places, s.tangents);
   s.begin(t);
   s.point_along(s.tangents);
@@ -384,7 +384,8 @@ ProjectionReport FastProjection::measure(const Eigen::Ref<const Eigen::VectorXd>
 double FastProjection::energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
   Impl& s = *impl_;
   if (s.options.variant == ProjectionVariant::paper) return 0;
-  evaluate(s.composed, x, s.map.fixed_places(t), s.y);
+  s.map.fixed_places(t, s.fixed_places);
+  evaluate(s.composed, x, s.fixed_places, s.y);
   return s.limit_energy();
 }
 

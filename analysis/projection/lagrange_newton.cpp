@@ -143,7 +143,7 @@ struct LagrangeNewton::Impl {
 };
 
 void LagrangeNewton::Impl::begin(double t) {
-  fixed_places = map.fixed_places(t);
+  map.fixed_places(t, fixed_places);
   for (int p = 0; p < places(); ++p) targets.col(p) = rows.place[p].target(t);
 }
 
