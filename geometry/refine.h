@@ -44,6 +44,8 @@ struct AffinePatch {
   double deviation = 0;  // largest distance found, same unit
 };
 std::optional<AffinePatch> affine_patch(const NurbsSurface& surface, double tolerance);
+// (u, v) of the point of the patch's plane nearest to x.
+Eigen::Vector2d parameters_at(const AffinePatch& patch, const Eigen::Vector3d& x);
 
 // A flat affine panel on other knots of the same domain: control points at Greville abscissae, which is exact.
 NurbsSurface rebuild(const AffinePatch& patch, KnotVector u, KnotVector v);

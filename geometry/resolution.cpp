@@ -113,6 +113,13 @@ AffinePatch fitted(const NurbsSurface& surface) {
 
 }  // namespace
 
+Eigen::Vector2d parameters_at(const AffinePatch& patch, const Eigen::Vector3d& x) {
+  const Eigen::Vector3d d = x - patch.origin;
+  const double uu = patch.du.squaredNorm(), uv = patch.du.dot(patch.dv), vv = patch.dv.squaredNorm();
+  const double a = patch.du.dot(d), b = patch.dv.dot(d), determinant = uu * vv - uv * uv;
+  return {(vv * a - uv * b) / determinant, (uu * b - uv * a) / determinant};
+}
+
 std::optional<AffinePatch> affine_patch(const NurbsSurface& surface, double tolerance) {
   if (surface.u().degree() == 0 || surface.v().degree() == 0) return std::nullopt;
   // Corners first: where they serve to rounding, their coordinates stay as they are.

@@ -7,6 +7,22 @@
 
 namespace toile {
 
+std::string name(MarkKind kind) {
+  switch (kind) {
+    case MarkKind::grain:
+      return "grain";
+    case MarkKind::notch:
+      return "notch";
+    case MarkKind::drill:
+      return "drill";
+    case MarkKind::line:
+      return "line";
+    case MarkKind::text:
+      return "text";
+  }
+  return {};
+}
+
 TrimLoop natural_loop(const NurbsSurface& surface) {
   const Interval u = surface.u().domain(), v = surface.v().domain();
   const Eigen::Vector2d corners[] = {{u.min, v.min}, {u.max, v.min}, {u.max, v.max}, {u.min, v.max}};

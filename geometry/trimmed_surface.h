@@ -33,6 +33,7 @@ struct TrimLoop {
 
 // What a pattern draws on a panel beside its outline, in the parameter plane: carried along, never cut.
 enum class MarkKind { grain, notch, drill, line, text };
+std::string name(MarkKind kind);  // "grain", ...
 struct PanelMark {
   MarkKind kind = MarkKind::line;
   Eigen::Vector2d at{0, 0};     // a point; where a curve starts

@@ -283,6 +283,48 @@ std::optional<std::string> value_of(const std::string& text, std::string_view ke
   return trimmed(std::string_view(text).substr(key.size() + 1));
 }
 
+// A mirror line (layer 6): a piece drawn as one half of itself, cut on the fold.
+struct Mirror {
+  Vector2d at, along;  // a point, the direction (a unit vector)
+
+  Vector2d operator()(const Vector2d& p) const { return at + 2 * along.dot(p - at) * along - (p - at); }
+  double distance(const Vector2d& p) const { return std::abs(along.x() * (p - at).y() - along.y() * (p - at).x()); }
+};
+
+std::optional<Mirror> mirror_of(const Item& item) {
+  if (item.layer != "6" || item.point) return std::nullopt;
+  const std::vector<Curve3> curves = curves_of(item, {});
+  if (curves.size() != 1 || curves[0].degree() != 1 || curves[0].points().cols() != 2) return std::nullopt;
+  const Vector2d a = curves[0].start().head<2>(), b = curves[0].end().head<2>();
+  if (a == b) return std::nullopt;
+  return Mirror{a, (b - a).normalized()};
+}
+
+Curve3 mirrored(const Mirror& mirror, const Curve3& curve) {
+  Eigen::Matrix3Xd points = curve.points();
+  for (Eigen::Index k = 0; k < points.cols(); ++k) points.col(k).head<2>() = mirror(points.col(k).head<2>());
+  return Curve3(curve.knots(), std::move(points), curve.weights());
+}
+
+// The edges on the mirror line go, all others come a second time. False, and nothing done, where no edge lies on it.
+bool unfold(std::vector<LooseCurve>& curves, const Mirror& mirror, double tolerance) {
+  const auto on_line = [&](const Curve3& c) {
+    for (Eigen::Index k = 0; k < c.points().cols(); ++k)
+      if (mirror.distance(c.points().col(k).head<2>()) > tolerance) return false;
+    return true;
+  };
+  std::size_t gone = 0;
+  for (LooseCurve& loose : curves) gone += std::erase_if(loose.pieces, on_line);
+  if (gone == 0) return false;
+  const std::size_t drawn = curves.size();
+  for (std::size_t k = 0; k < drawn; ++k) {
+    LooseCurve image = curves[k];
+    for (Curve3& c : image.pieces) c = mirrored(mirror, c);
+    curves.push_back(std::move(image));
+  }
+  return true;
+}
+
 class DxfReader {
  public:
   DxfReader(const std::string& name, PanelFile& out) : name_(name), out_(out) { out_.path = name; }
@@ -291,7 +333,7 @@ class DxfReader {
  private:
   void find_unit(const std::vector<Block>& blocks);
   void piece(const Block& block);
-  void add_mark(std::vector<TrimmedSurface>& panels, const Item& item);
+  void add_mark(std::vector<TrimmedSurface>& panels, const Item& item, const std::optional<Mirror>& mirror);
   void warn(int line, const std::string& what) {
     out_.warnings.push_back(name_ + ":" + std::to_string(line) + ": " + what);
   }
@@ -323,15 +365,28 @@ void DxfReader::find_unit(const std::vector<Block>& blocks) {
   out_.warnings.push_back(name_ + ": no text 'Units: METRIC' or 'Units: ENGLISH'; millimetres are assumed");
 }
 
-void DxfReader::add_mark(std::vector<TrimmedSurface>& panels, const Item& item) {
+// On an unfolded piece notches, holes and lines come twice; grain lines and texts don't.
+void DxfReader::add_mark(std::vector<TrimmedSurface>& panels, const Item& item, const std::optional<Mirror>& mirror) {
   // A block has one piece as a rule; else the first whose box holds the mark.
-  const auto add = [&](PanelMark mark) {
+  const auto add_one = [&](PanelMark mark) {
     for (TrimmedSurface& panel : panels) {
       const Interval u = panel.surface.u().domain(), v = panel.surface.v().domain();
       if (panels.size() > 1 && !(u.contains(mark.at.x()) && v.contains(mark.at.y()))) continue;
       panel.marks.push_back(std::move(mark));
       return;
     }
+  };
+  const auto add = [&](const PanelMark& mark) {
+    add_one(mark);
+    if (!mirror || item.layer == "6" || mark.kind == MarkKind::grain || mark.kind == MarkKind::text) return;
+    PanelMark image = mark;
+    image.at = (*mirror)(mark.at);
+    if (image.curve) {
+      Curve2::Points points = image.curve->points();
+      for (Eigen::Index k = 0; k < points.cols(); ++k) points.col(k) = (*mirror)(points.col(k));
+      image.curve = Curve2(image.curve->knots(), std::move(points), image.curve->weights());
+    }
+    add_one(std::move(image));
   };
   PanelMark mark;
   const std::string& layer = item.layer;
@@ -348,7 +403,7 @@ void DxfReader::add_mark(std::vector<TrimmedSurface>& panels, const Item& item) 
     } else {
       return;  // turn, curve and grading points are how the boundary is drawn
     }
-    add(std::move(mark));
+    add(mark);
     return;
   }
   for (const Curve3& curve : curves_of(item, {})) {
@@ -374,12 +429,22 @@ void DxfReader::piece(const Block& block) {
     if (!loose.pieces.empty()) curves.push_back(std::move(loose));
   }
   if (curves.empty()) return;
+  std::optional<Mirror> mirror;
+  for (const Item& item : block.items) {
+    const std::optional<Mirror> line = mirror_of(item);
+    if (!line || mirror) continue;
+    if (unfold(curves, *line, 10 * out_.resolution)) {
+      mirror = line;
+    } else {
+      warn(item.line, "piece '" + name + "': no edge lies on its mirror line; it stays as it is drawn");
+    }
+  }
   Outlines found = find_outlines(std::move(curves), {}, 0);
   for (const OutlineNote& note : found.notes)
     warn(block.items[static_cast<std::size_t>(note.id)].line, "piece '" + name + "': " + note.what);
   if (found.panels.empty()) warn(block.line, "piece '" + name + "' has no closed boundary and is left out");
   for (const Item& item : block.items)
-    if (!boundary(item) || item.point) add_mark(found.panels, item);
+    if (!boundary(item) || item.point) add_mark(found.panels, item, mirror);
   for (std::size_t k = 0; k < found.panels.size(); ++k) {
     TrimmedSurface& panel = found.panels[k];
     panel.name = name;

@@ -152,10 +152,15 @@ class Chains {
       int next = -1;
       for (const int k : at_[static_cast<std::size_t>(end)])
         if (!used_[static_cast<std::size_t>(k)]) next = k;
+      if (next < 0) break;  // the other part of this chain has been followed, to a fork that was noted
       const Piece& piece = pieces_[static_cast<std::size_t>(next)];
       used_[static_cast<std::size_t>(next)] = true;
       chain.push_back({next, piece.from != end});
       end = piece.from == end ? piece.to : piece.from;
+    }
+    if (end != start && degree_[static_cast<std::size_t>(end)] == 2) {
+      for (const Step& step : chain) open.push_back(step.piece);
+      return;
     }
     const int fork = degree_[static_cast<std::size_t>(start)] == 2 ? end : start;
     if (end == start && degree_[static_cast<std::size_t>(start)] == 2) {

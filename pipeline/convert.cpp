@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <limits>
+#include <numbers>
 
 #include "geometry/error.h"
 #include "io/mesh_files.h"
 #include "io/obj.h"
 #include "io/vtu.h"
-#include "pipeline/units.h"
 #include "trimming/triangulation.h"
 
 namespace toile {
@@ -30,12 +31,6 @@ bool asks(const InspectOptions& options) {
 std::string new_iges(PanelFile file, const InspectOptions& options, const std::string& name, Conversion& out) {
   std::vector<OutputFace> faces;
   for (TrimmedSurface& panel : file.panels) {
-    if (!panel.marks.empty()) {
-      const std::optional<double> grain = grain_angle(panel);
-      out.warnings.push_back(fmt::format(
-          "panel '{}': its {} marks (notches, lines, texts) are not written to IGES{}", panel.name, panel.marks.size(),
-          grain ? "; its grain line is grain_deg = " + degrees_text(*grain) : std::string()));
-    }
     if (asks(options)) panel.surface = refined(panel, options);
     faces.push_back({std::move(panel), {}, 0, std::nullopt});
   }
@@ -97,6 +92,7 @@ struct MeshedPanels {
 
 void mesh(const PanelFile& file, const InspectOptions& options, MeshedPanels& out, Conversion& conversion) {
   std::size_t count = 0;
+  double smallest_angle = std::numbers::pi, shortest = std::numeric_limits<double>::infinity(), longest = 0;
   for (const TrimmedSurface& panel : file.panels) {
     TrimmedSurface face = panel;
     face.surface = refined(face, options);
@@ -104,7 +100,11 @@ void mesh(const PanelFile& file, const InspectOptions& options, MeshedPanels& ou
       conversion.warnings.push_back(fmt::format("panel '{}': loop {}: {}", face.name, repair.loop, repair.what));
     const TrimTopology topology = trace_trims(face);
     out.triangles.push_back(triangulate(face, topology));
-    count += out.triangles.back().triangles.size();
+    const TrimmedTriangles& triangles = out.triangles.back();
+    count += triangles.triangles.size();
+    smallest_angle = std::min(smallest_angle, triangles.quality.smallest_angle);
+    shortest = std::min(shortest, face.metres_per_unit * triangles.quality.shortest_edge);
+    longest = std::max(longest, face.metres_per_unit * triangles.quality.longest_edge);
     out.points.push_back(constraint_points(face, topology));
     out.surfaces.push_back(face.surface.with_points(face.metres_per_unit * face.surface.points()));
     out.faces.push_back(std::move(face));
@@ -118,7 +118,9 @@ void mesh(const PanelFile& file, const InspectOptions& options, MeshedPanels& ou
     panel.points = out.points[k];
     out.panels.push_back(std::move(panel));
   }
-  conversion.notes.push_back(fmt::format("{} triangles in {} panels, metres", count, out.panels.size()));
+  conversion.notes.push_back(
+      fmt::format("{} triangles in {} panels, metres; smallest angle {:.3g} degrees, edges {:.3g} to {:.3g} m", count,
+                  out.panels.size(), smallest_angle * 180 / std::numbers::pi, shortest, longest));
 }
 
 using Format = std::string (*)(const Frame&);

@@ -171,6 +171,9 @@ nlohmann::ordered_json panel_json(const InspectedPanel& panel) {
                        {"interval", counts.interval},
                        {"exact", counts.exact},
                        {"algebraic", counts.algebraic}};
+  if (!panel.face.marks.empty()) out["marks"] = Json::array();
+  for (const PanelMark& mark : panel.face.marks)
+    out["marks"].push_back({{"kind", name(mark.kind)}, {"at", {mark.at.x(), mark.at.y()}}, {"text", utf8(mark.text)}});
   out["constraint_points"] = Json::array();
   for (const ConstraintPoint& point : panel.points) {
     const Eigen::Vector3d x = position(panel, point.u, point.v);

@@ -1,5 +1,7 @@
 // Entities 124 (transformation), 212 (general note), 314 (colour), 406 form 15 (name).
 // [IGES 5.3, 4.21, 4.60, 4.77, 4.98]
+#include <numbers>
+
 #include "io/iges/entity.h"
 
 namespace toile::iges {
@@ -38,6 +40,15 @@ std::vector<NoteString> read_note(Parameters& in) {
     strings.push_back(std::move(line));
   }
   return strings;
+}
+
+void write(const NoteString& note, double height, Record& out) {
+  const auto count = static_cast<long long>(note.text.size());
+  // One string in font 1, upright (the slant angle is a right angle), along x.
+  out.integer(1).integer(count).real(height * static_cast<double>(count)).real(height).integer(1);
+  out.real(std::numbers::pi / 2).real(0).integer(0).integer(0);
+  for (int axis = 0; axis < 3; ++axis) out.real(note.at[axis]);
+  out.string(note.text);
 }
 
 Colour read_colour(Parameters& in) {

@@ -103,6 +103,7 @@ struct NoteString {
   std::string text;
 };
 std::vector<NoteString> read_note(Parameters& in);
+void write(const NoteString& note, double height, Record& out);
 
 // 102: directory numbers of its curves, in order.
 std::vector<int> read_composite(Parameters& in);

@@ -405,12 +405,6 @@ class FaceMaker {
     for (std::size_t i = 0; i < order.size(); ++i) model[i] = boundary.model[order[i]];
     chain(model);
     const std::optional<AffinePatch> patch = file_.plane ? std::nullopt : affine_patch(s_, 1e-9 * size_);
-    Eigen::Matrix<double, 2, 3> inverse;
-    if (patch) {
-      Eigen::Matrix<double, 3, 2> map;
-      map << patch->du, patch->dv;
-      inverse = (map.transpose() * map).inverse() * map.transpose();
-    }
     std::vector<Curve2> flat;
     for (const Curve3& m : model) {
       if (file_.plane) {
@@ -425,9 +419,11 @@ class FaceMaker {
       }
       if (patch) {
         // The inverse map on the control points is exact.
-        flat.emplace_back(m.knots(), Curve2::Points(inverse * (m.points().colwise() - patch->origin)), m.weights());
+        Curve2::Points points(2, m.points().cols());
+        for (Eigen::Index i = 0; i < points.cols(); ++i) points.col(i) = parameters_at(*patch, m.points().col(i));
+        flat.emplace_back(m.knots(), std::move(points), m.weights());
         for (const Vector3d& x : {m.start(), m.end()}) {
-          const Vector2d uv = inverse * (x - patch->origin);
+          const Vector2d uv = parameters_at(*patch, x);
           const double off = (patch->origin + patch->du * uv.x() + patch->dv * uv.y() - x).norm();
           if (off > out.distance) out.distance = off, out.place = x;
         }

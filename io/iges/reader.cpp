@@ -7,6 +7,7 @@
 #include "io/iges/entity.h"
 #include "io/iges/face_finding.h"
 #include "io/iges/face_reading.h"
+#include "io/iges/marks.h"
 #include "io/iges/outline_reading.h"
 
 namespace toile {
@@ -35,7 +36,7 @@ void finish_names(std::vector<TrimmedSurface>& panels, const std::vector<std::st
 
 std::vector<TrimmedSurface> read_panels(Reading& reading) {
   std::vector<TrimmedSurface> panels;
-  std::vector<std::string> labels;
+  std::vector<const Entry*> entries;
   for (const PlacedFace& face : find_faces(reading)) {
     const Entry& e = *face.entry;
     try {
@@ -46,7 +47,7 @@ std::vector<TrimmedSurface> read_panels(Reading& reading) {
         place(t, panel);
         reading.sign(panel, e);
         panels.push_back(std::move(panel));
-        labels.push_back(e.label);
+        entries.push_back(&e);
       }
     } catch (const InputError& error) {
       reading.quarantine(e, error.what());  // its parts may be read; the face is not there
@@ -54,6 +55,9 @@ std::vector<TrimmedSurface> read_panels(Reading& reading) {
       reading.quarantine(e, reading.file.place(e) + error.what());
     }
   }
+  read_marks(reading, entries, panels);
+  std::vector<std::string> labels;
+  for (const Entry* e : entries) labels.push_back(e->label);
   if (!holds_faces(reading.file)) panels = outline_panels(reading);
   labels.resize(panels.size());
   if (panels.empty() && !reading.first_failure().empty()) throw InputError(reading.first_failure());

@@ -144,6 +144,46 @@ class ArcLength {
   std::map<double, double> known_;  // a fit asks for the same fractions again and again
 };
 
+// The ruled surface between rational curves on one knot vector: over the product of their weights, which are the two
+// edges' common denominator, it is of twice their degree, exactly.
+NurbsSurface ruled_over_product(const Curve3& a, const Curve3& b) {
+  const int p = a.degree(), q = 2 * p;
+  const std::vector<BezierCurve<3>> pieces_a = bezier_pieces(a), pieces_b = bezier_pieces(b);
+  const auto choose = [](int n, int k) {
+    double out = 1;
+    for (int i = 1; i <= k; ++i) out = out * (n - k + i) / i;
+    return out;
+  };
+  std::vector<double> knots(1, a.domain().min), weights;
+  std::array<std::vector<Eigen::Vector3d>, 2> edges;
+  for (std::size_t s = 0; s < pieces_a.size(); ++s) {
+    const BezierCurve<3>&x = pieces_a[s], &y = pieces_b[s];
+    knots.insert(knots.end(), static_cast<std::size_t>(q), x.range.min);
+    for (int k = s == 0 ? 0 : 1; k <= q; ++k) {
+      double w = 0;
+      Eigen::Vector3d on_a = Eigen::Vector3d::Zero(), on_b = on_a;
+      for (int i = std::max(0, k - p); i <= std::min(k, p); ++i) {
+        const double share = choose(p, i) * choose(p, k - i) / choose(q, k);
+        w += share * x.weights[i] * y.weights[k - i];
+        on_a += share * x.weights[i] * y.weights[k - i] * x.points.col(i);
+        on_b += share * x.weights[k - i] * y.weights[i] * y.points.col(i);
+      }
+      weights.push_back(w);
+      edges[0].push_back(on_a / w);
+      edges[1].push_back(on_b / w);
+    }
+  }
+  knots.insert(knots.end(), static_cast<std::size_t>(q) + 1, a.domain().max);
+  const auto n = static_cast<Eigen::Index>(weights.size());
+  Eigen::Matrix3Xd points(3, 2 * n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    points.col(k) = edges[0][static_cast<std::size_t>(k)];
+    points.col(n + k) = edges[1][static_cast<std::size_t>(k)];
+  }
+  weights.insert(weights.end(), weights.begin(), weights.end());
+  return NurbsSurface(KnotVector(q, std::move(knots)), KnotVector(), std::move(points), std::move(weights));
+}
+
 bool constant_speed(const NaturalCurve& c) {
   if (c.curve.degree() == 1 && c.curve.points().cols() == 2 && !c.curve.rational()) return true;
   return c.turns.size() == 1 && c.turns[0].range.min == c.curve.domain().min &&
@@ -177,8 +217,14 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
   FileSurface out;
   out.how = "ruled surface as B-spline surface";
   Curve3 c = a.curve, d = b.curve;
-  if (!by_length && same(a.map.turns, b.map.turns) && made_compatible(c, d) &&
-      (c.weights() == d.weights() || (!c.rational() && !d.rational()))) {
+  const bool exact = !by_length && same(a.map.turns, b.map.turns) && made_compatible(c, d);
+  const bool like = c.weights() == d.weights() || (!c.rational() && !d.rational());
+  if (exact && !like && 2 * c.degree() <= max_degree) {
+    out.surface = ruled_over_product(c, d);
+    out.maps[0].u = a.map;
+    return out;
+  }
+  if (exact && like) {
     const int n = c.knots().control_point_count();
     Eigen::Matrix3Xd points(3, 2 * n);
     points << c.points(), d.points();

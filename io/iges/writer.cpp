@@ -9,7 +9,9 @@
 #include "io/iges.h"
 #include "io/iges/cards.h"
 #include "io/iges/entity.h"
+#include "io/iges/marks.h"
 #include "io/iges/model_curve.h"
+#include "io/iges/topology.h"
 
 namespace toile {
 
@@ -23,6 +25,8 @@ constexpr const char* independent = "00000000";
 constexpr const char* dependent = "00010000";
 constexpr const char* parametric = "00010500";
 constexpr const char* definition = "00000200";
+constexpr const char* annotation = "00000100";
+constexpr double text_height = 0.02;  // of the face's size
 
 class FaceWriter {
  public:
@@ -43,10 +47,19 @@ class FaceWriter {
     return add(card, record);
   }
   int curve(const Curve3& c, const char* status);
+  int add_named(const Card& card, Record& record, int name_number);
+  struct CurvePair {
+    Curve3 parameter, model;
+  };
+  CurvePair curve_pair(const Curve2& c, const NurbsSurface& surface, const std::optional<AffinePatch>& patch,
+                       double tolerance);
   int chain(const std::vector<int>& curves, const char* status);
   int boundary(const TrimLoop& loop, const NurbsSurface& surface, int surface_number,
                const std::optional<AffinePatch>& patch, double tolerance);
   int colour(const std::array<double, 3>& rgb);
+  int name(const std::string& words);
+  void marks(const OutputFace& output, int face_number, int surface_number, const std::optional<AffinePatch>& patch,
+             double size);
 
   std::vector<OutRecord>& records_;
   std::map<std::array<double, 3>, int> colours_;
@@ -87,21 +100,23 @@ std::vector<Curve2> in_file_order(const TrimLoop& loop) {
   return out;
 }
 
+FaceWriter::CurvePair FaceWriter::curve_pair(const Curve2& c, const NurbsSurface& surface,
+                                             const std::optional<AffinePatch>& patch, double tolerance) {
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, c.points().cols());
+  points.topRows<2>() = c.points();
+  ModelCurve model = fit_model_curve(surface, c, tolerance, patch);
+  largest_fit_ = std::max(largest_fit_, model.error);
+  return {Curve3(c.knots(), std::move(points), c.weights()), std::move(model.curve)};
+}
+
 int FaceWriter::boundary(const TrimLoop& loop, const NurbsSurface& surface, int surface_number,
                          const std::optional<AffinePatch>& patch, double tolerance) {
   std::vector<int> parameter_curves, model_curves;
-  const std::vector<Curve2> curves = in_file_order(loop);
-  for (const Curve2& c : curves) {
-    Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, c.points().cols());
-    points.topRows<2>() = c.points();
-    parameter_curves.push_back(curve(Curve3(c.knots(), std::move(points), c.weights()), parametric));
-  }
+  std::vector<CurvePair> pairs;
+  for (const Curve2& c : in_file_order(loop)) pairs.push_back(curve_pair(c, surface, patch, tolerance));
+  for (const CurvePair& pair : pairs) parameter_curves.push_back(curve(pair.parameter, parametric));
   const int parameter_chain = chain(parameter_curves, parametric);
-  for (const Curve2& c : curves) {
-    const ModelCurve model = fit_model_curve(surface, c, tolerance, patch);
-    largest_fit_ = std::max(largest_fit_, model.error);
-    model_curves.push_back(curve(model.curve, dependent));
-  }
+  for (const CurvePair& pair : pairs) model_curves.push_back(curve(pair.model, dependent));
   const int model_chain = chain(model_curves, dependent);
   return add({.type = 142, .status = dependent}, Boundary{.creation = 0,
                                                           .surface = surface_number,
@@ -113,25 +128,16 @@ int FaceWriter::boundary(const TrimLoop& loop, const NurbsSurface& surface, int 
 void FaceWriter::add(const OutputFace& output) {
   const TrimmedSurface& face = output.face;
   const NurbsSurface& s = face.surface;
-  const std::string& name = output.name.empty() ? face.name : output.name;
+  const std::string& words = output.name.empty() ? face.name : output.name;
   const int colour_number = output.colour ? -colour(*output.colour) : 0;
-  int name_number = 0;
-  if (!name.empty()) {
-    Record record(406);
-    write_name(name, record);
-    name_number = add({.type = 406, .form = 15, .status = dependent}, record);
-  }
-  auto finish = [&](const Card& card, Record& record) {
-    // No associativities, one property.
-    if (name_number != 0) record.integer(0).integer(1).integer(name_number);
-    add(card, record);
-  };
+  const int name_number = words.empty() ? 0 : name(words);
   const SplineSurface spline{s, s.u().domain(), s.v().domain()};
-  // A face without a trim is the surface itself, free-standing.
-  if (face.natural_bounds) {
+  // A face without a trim is the surface itself, free-standing; with marks on it, it can't be.
+  if (face.natural_bounds && face.marks.empty()) {
     Record record(128);
     write(spline, record);
-    finish({.type = 128, .level = output.level, .colour = colour_number, .status = independent}, record);
+    add_named({.type = 128, .level = output.level, .colour = colour_number, .status = independent}, record,
+              name_number);
     return;
   }
   const double size = (s.points().rowwise().maxCoeff() - s.points().rowwise().minCoeff()).norm();
@@ -154,7 +160,53 @@ void FaceWriter::add(const OutputFace& output) {
   }
   Record record(144);
   write(record_of_face, record);
-  finish({.type = 144, .level = output.level, .colour = colour_number, .status = independent}, record);
+  const int face_number = add_named(
+      {.type = 144, .level = output.level, .colour = colour_number, .status = independent}, record, name_number);
+  if (!face.marks.empty()) marks(output, face_number, surface_number, patch, size);
+}
+
+int FaceWriter::name(const std::string& words) {
+  Record record(406);
+  write_name(words, record);
+  return add({.type = 406, .form = 15, .status = dependent}, record);
+}
+
+int FaceWriter::add_named(const Card& card, Record& record, int name_number) {
+  // No associativities, one property.
+  if (name_number != 0) record.integer(0).integer(1).integer(name_number);
+  return add(card, record);
+}
+
+void FaceWriter::marks(const OutputFace& output, int face_number, int surface_number,
+                       const std::optional<AffinePatch>& patch, double size) {
+  const NurbsSurface& s = output.face.surface;
+  std::vector<int> members{face_number};
+  for (const PanelMark& mark : output.face.marks) {
+    if (mark.curve) {
+      const int label = name(label_of(mark));
+      Record record(142);
+      const auto [parameter_curve, model_curve] = curve_pair(*mark.curve, s, patch, curve_tolerance * size);
+      write(Boundary{.creation = 0,
+                     .surface = surface_number,
+                     .parameter_curve = curve(parameter_curve, parametric),
+                     .model_curve = curve(model_curve, dependent),
+                     .preference = 1},
+            record);
+      members.push_back(add_named({.type = 142, .level = output.level, .status = independent}, record, label));
+    } else if (mark.kind == MarkKind::text) {
+      Record record(212);
+      write(NoteString{s(mark.at.x(), mark.at.y()), mark.text}, text_height * size, record);
+      members.push_back(add({.type = 212, .level = output.level, .status = annotation}, record));
+    } else {
+      const int label = name(label_of(mark));
+      Record record(116);
+      write(PlacePoint{s(mark.at.x(), mark.at.y()), 0}, record);
+      members.push_back(add_named({.type = 116, .level = output.level, .status = independent}, record, label));
+    }
+  }
+  Record record(402);
+  write_group(members, 7, record);
+  add({.type = 402, .form = 7, .level = output.level, .status = independent}, record);
 }
 
 // YYYYMMDD.HHNNSS in UTC of a Unix time.

@@ -1,5 +1,5 @@
-// One second of processor time for each input: libFuzzer's own limit counts wall time, which says nothing on a busy
-// machine.
+// Processor time for each input: libFuzzer's own limit counts wall time, which says nothing on a busy machine. One
+// second is meant for the program as it ships; the instrumented one takes 10 to 20 times as long.
 #pragma once
 
 #include <cstdio>
@@ -15,7 +15,7 @@ class CpuLimit {
   CpuLimit& operator=(const CpuLimit&) = delete;
   ~CpuLimit() {
     const double seconds = static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC;
-    if (seconds <= 1) return;
+    if (seconds <= 10) return;
     std::fprintf(stderr, "the input took %.2f s\n", seconds);
     std::abort();
   }

@@ -9,6 +9,7 @@
 #include "io/dxf.h"
 #include "io/file.h"
 #include "io/panel_facts.h"
+#include "support/flipped.h"
 #include "support/near.h"
 
 namespace toile {
@@ -119,9 +120,91 @@ TEST(Dxf, WhatIsWrongIsNamedWithItsLine) {
                "p.dxf:10: group code 90 is '2000000000'");
 }
 
+// Half a piece, 100 wide and 300 high, with a notch at the hem, a drill hole and a grain line; its mirror line at x.
+std::string half_piece(const std::string& x) {
+  const auto line = [](const std::string& layer, const std::string& x0, const std::string& y0, const std::string& x1,
+                       const std::string& y1) {
+    return "  0\nLINE\n  8\n" + layer + "\n 10\n" + x0 + "\n 20\n" + y0 + "\n 11\n" + x1 + "\n 21\n" + y1 + "\n";
+  };
+  const auto point = [](const std::string& layer, const std::string& x0, const std::string& y0) {
+    return "  0\nPOINT\n  8\n" + layer + "\n 10\n" + x0 + "\n 20\n" + y0 + "\n";
+  };
+  return "  0\nSECTION\n  2\nBLOCKS\n  0\nBLOCK\n  8\n0\n  2\nBACK\n 10\n0\n 20\n0\n"
+         "  0\nTEXT\n  8\n1\n 10\n0\n 20\n0\n 40\n5\n  1\nUnits: METRIC\n" +
+         line("1", "0", "0", "100", "0") + line("1", "100", "0", "80", "300") + line("1", "80", "300", "0", "300") +
+         line("1", "0", "300", "0", "0") + line("6", x, "0", x, "300") + point("4", "50", "0") +
+         point("13", "40", "200") + line("8", "10", "50", "60", "50") + line("7", "20", "100", "20", "250") +
+         "  0\nENDBLK\n  8\n0\n  0\nENDSEC\n  0\nEOF\n";
+}
+
+TEST(Dxf, APieceCutOnTheFoldIsUnfolded) {
+  const PanelFile file = parse_dxf(half_piece("0"), "half.dxf");
+  EXPECT_TRUE(file.warnings.empty()) << testing::PrintToString(file.warnings);
+  ASSERT_EQ(file.panels.size(), 1u);
+  const TrimmedSurface& back = file.panels[0];
+  ASSERT_EQ(back.loops.size(), 1u);
+  EXPECT_EQ(back.loops[0].curves.size(), 6u);
+  expect_near_rel(area(back), 2 * 90.0 * 300, 1e-12);
+  EXPECT_EQ(count(back, MarkKind::notch), 2);
+  EXPECT_EQ(count(back, MarkKind::drill), 2);
+  EXPECT_EQ(count(back, MarkKind::line), 3);  // the fold, and the inner line twice
+  EXPECT_EQ(count(back, MarkKind::grain), 1);
+}
+
+TEST(Dxf, AMirrorLineThatIsNoEdgeFoldsNothing) {
+  const PanelFile file = parse_dxf(half_piece("10"), "half.dxf");
+  ASSERT_EQ(file.warnings.size(), 1u);
+  EXPECT_NE(file.warnings[0].find("no edge lies on its mirror line"), std::string::npos) << file.warnings[0];
+  expect_near_rel(area(file.panels.at(0)), 90.0 * 300, 1e-12);
+  EXPECT_EQ(count(file.panels[0], MarkKind::notch), 1);
+}
+
 TEST(Dxf, ATruncatedFileIsRefusedWithItsPlace) {
   const std::string text = apron();
   for (std::size_t size = 0; size + 5 < text.size(); size += 37) expect_error(text.substr(0, size), "");
+}
+
+// What tests/fuzz/run found; the name says what it was.
+TEST(Dxf, FindingsOfTheFuzzerStayFixed) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::filesystem::path(TOILE_TEST_DATA) / "fuzz" / "dxf")) {
+    SCOPED_TRACE(entry.path().filename().string());
+    try {
+      parse_dxf(read_file(entry.path()), "found.dxf");
+    } catch (const InputError&) {
+    }
+  }
+}
+
+// Two edges that end at a fork: each is followed from its own side, and neither makes a panel.
+TEST(Dxf, AChainToAForkIsFollowedFromBothItsEnds) {
+  std::string text = half_piece("0");
+  const std::string edge = "  0\nLINE\n  8\n1\n 10\n0\n 20\n0\n 11\n0\n 21\n-50\n";
+  text.insert(text.find("  0\nENDBLK"), edge + "  0\nLINE\n  8\n1\n 10\n0\n 20\n-50\n 11\n0\n 21\n0\n");
+  try {
+    for (const std::string& warning : parse_dxf(text, "fork.dxf").warnings)
+      EXPECT_EQ(warning.find("fork.dxf:"), 0u) << warning;
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("no piece with a closed boundary"), std::string::npos) << error.what();
+  }
+}
+
+// Any other exception than InputError fails the test.
+TEST(Dxf, FlippedBytesGivePanelsOrErrors) {
+  const std::uint32_t seed = 20261126;
+  std::mt19937 random(seed);
+  int read = 0, refused = 0;
+  for (int k = 0; k < 2000; ++k) {
+    SCOPED_TRACE("flip " + std::to_string(k) + ", seed " + std::to_string(seed));
+    try {
+      parse_dxf(test::flipped(k % 2 == 0 ? apron() : half_piece("0"), "0123456789.-\n eEAPLV", random), "flipped.dxf");
+      ++read;
+    } catch (const InputError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(read, 100);
+  EXPECT_GT(refused, 100);
 }
 
 }  // namespace

@@ -39,6 +39,42 @@ inline bool has_warning(const PanelFile& file, const std::string& part) {
                      [&](const std::string& w) { return w.find(part) != std::string::npos; });
 }
 
+// The file with more entities at its end, each a record on one line ("102,2,1,3;").
+inline std::string with_entities(const std::string& text, const std::vector<std::string>& records) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0, end = 0; at < text.size(); at = end + 1) {
+    end = std::min(text.find('\n', at), text.size());
+    lines.push_back(text.substr(at, end - at));
+  }
+  const auto is = [](char section) {
+    return [=](const std::string& line) { return line.size() > 72 && line[72] == section; };
+  };
+  for (const std::string& record : records) {
+    const auto directory = std::count_if(lines.begin(), lines.end(), is('D'));
+    const auto parameters = std::count_if(lines.begin(), lines.end(), is('P'));
+    const auto padded = [](std::string field, std::size_t width) {
+      return std::string(width - std::min(width, field.size()), ' ') + field;
+    };
+    const std::string type = padded(record.substr(0, record.find(',')), 8), one = padded("1", 8), none = padded("0", 8);
+    const auto line = [&](std::string data, char section, std::ptrdiff_t number) {
+      data.resize(72, ' ');
+      return data + section + padded(std::to_string(number), 7);
+    };
+    const std::string first = type + padded(std::to_string(parameters + 1), 8) + std::string(48, ' ') + "00000000";
+    const std::string second = type + none + none + one + (type == padded("406", 8) ? padded("15", 8) : one);
+    std::string data = record;
+    data.resize(64, ' ');
+    const auto after_directory = std::find_if(lines.begin(), lines.end(), is('P'));
+    const auto at = lines.insert(after_directory, line(first, 'D', directory + 1));
+    lines.insert(at + 1, line(second, 'D', directory + 2));
+    const auto after_parameters = std::find_if(lines.rbegin(), lines.rend(), is('P')).base();
+    lines.insert(after_parameters, line(data + padded(std::to_string(directory + 1), 8), 'P', parameters + 1));
+  }
+  std::string out;
+  for (const std::string& line : lines) out += line + '\n';
+  return out;
+}
+
 // What the call throws as InputError; empty if it doesn't.
 template <class Error, class Call>
 std::string message_of(Call&& call) {

@@ -182,6 +182,21 @@ TEST(IgesFaces, RulingsByArcLengthAreFittedWithTheirError) {
   EXPECT_TRUE(has_warning(file, "off by"));
 }
 
+TEST(IgesFaces, ARuledSurfaceBetweenUnlikeWeightsIsExact) {
+  const PanelFile file = read_corpus("ruled_unlike_weights");
+  const NurbsSurface& s = file.panels.at(0).surface;
+  const double h = std::sqrt(0.5);
+  Eigen::Matrix3Xd arc(3, 3), wave(3, 4);
+  arc << 100, 100, 0, 0, 100, 100, 0, 0, 0;
+  wave << 120, 90, 60, 0, 0, 40, 90, 130, 50, 60, 40, 50;
+  const Curve3 a(KnotVector(2, {0, 0, 0, 1, 1, 1}), arc, {1, h, 1});
+  const Curve3 b(KnotVector(2, {0, 0, 0, 0.4, 1, 1, 1}), wave, {1, 2, 0.5, 1});
+  for (const double u : {0.0, 0.1, 0.39, 0.4, 0.7, 1.0})
+    for (const double v : {0.0, 0.25, 1.0})
+      EXPECT_LE((s(u, v) - ((1 - v) * a(u) + v * b(u))).norm(), 1e-12) << u << ' ' << v;
+  EXPECT_EQ(row(file, 118).why.find("off by"), std::string::npos);
+}
+
 TEST(IgesFaces, ModelCurvesOnACurvedSurfaceArePulledBackOntoTheirKnotLines) {
   const PanelFile file = read_corpus("model_curves_on_curved");
   const TrimLoop& loop = file.panels[0].loops[0];

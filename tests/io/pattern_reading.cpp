@@ -9,6 +9,7 @@
 #include "io/file.h"
 #include "io/panel_facts.h"
 #include "io/pattern_json.h"
+#include "support/flipped.h"
 #include "support/near.h"
 
 namespace toile {
@@ -204,6 +205,27 @@ TEST(Pattern, ATruncatedFileIsRefusedWithItsPlace) {
       EXPECT_EQ(std::string(error.what()).find("cut.json:"), 0u) << error.what();
     }
   }
+}
+
+// Any other exception than InputError fails the test.
+TEST(Pattern, FlippedBytesGivePanelsOrErrors) {
+  const std::uint32_t seed = 20261126;
+  std::mt19937 random(seed);
+  int read = 0, refused = 0;
+  for (const std::string name : {"bodice_and_cuff.json", "skirt.jsonc"}) {
+    const std::string source = corpus_text(name);
+    for (int k = 0; k < 2000; ++k) {
+      SCOPED_TRACE("flip " + std::to_string(k) + ", seed " + std::to_string(seed));
+      try {
+        parse_pattern(test::flipped(source, "0123456789.,:[]{}\"-eE ntfu", random), "flipped.json");
+        ++read;
+      } catch (const InputError&) {
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GT(read, 100);
+  EXPECT_GT(refused, 100);
 }
 
 }  // namespace
