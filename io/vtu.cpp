@@ -142,7 +142,7 @@ class Writer {
   template <class... Arrays>
   void section(const std::string& name, const std::string& attributes, const Arrays&... arrays) {
     head_ += '<' + name + attributes + ">\n";
-    const auto each = [this](const auto& list) {
+    const auto each = [&](const auto& list) {
       for (const auto& a : list) array(a.name, a.components, a.values.data(), a.values.size());
     };
     (each(arrays), ...);

@@ -14,19 +14,19 @@ void Console::detect(const std::string& colour_mode) {
 }
 
 void Console::error(const std::string& text) {
-  end_live();
+  start_line();
   std::fprintf(stderr, "%serror:%s %s\n", colour ? "\x1b[1;31m" : "", colour ? "\x1b[0m" : "", text.c_str());
 }
 
 void Console::warning(const std::string& text) {
   if (quiet) return;
-  end_live();
+  start_line();
   std::fprintf(stderr, "%swarning:%s %s\n", colour ? "\x1b[33m" : "", colour ? "\x1b[0m" : "", text.c_str());
 }
 
 void Console::note(const std::string& text) {
   if (quiet) return;
-  end_live();
+  start_line();
   std::fprintf(stderr, "%s\n", text.c_str());
 }
 
@@ -47,6 +47,12 @@ void Console::live(const std::string& text) {
   } else {
     std::fprintf(stderr, "%s\n", text.c_str());
   }
+}
+
+// Standard output may be the same terminal or pipe: what was printed there comes first.
+void Console::start_line() {
+  std::fflush(stdout);
+  end_live();
 }
 
 void Console::end_live() {

@@ -23,6 +23,7 @@ class Console {
   void end_live();
 
  private:
+  void start_line();
   bool live_ = false;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };

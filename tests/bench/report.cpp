@@ -105,8 +105,11 @@ void growth(const std::string& samples) {
   }
   const auto grows = [&](const std::string& what, const std::vector<double>& cost, bool judged) {
     const double power = exponent(size, cost);
+    std::string steps;
+    for (std::size_t k = 0; k + 1 < size.size(); ++k)
+      steps += fmt::format(" {:.2f}", exponent({size[k], size[k + 1]}, {cost[k], cost[k + 1]}));
     row("  " + what, fmt::format("n^{:.2f}", power), judged ? "<= n^1.1" : "", power <= linear,
-        "1 core; fitted over 10^2 to 10^5 control points");
+        "1 core; fitted over 10^2 to 10^5 control points; from size to size" + steps);
   };
   grows("step without projection", motion, true);
   grows("projection without factorisation", projection, true);
