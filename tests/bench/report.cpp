@@ -3,6 +3,7 @@
 // target that is missed is printed as such and is no error: machines differ.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <fstream>
@@ -72,6 +73,31 @@ void functions(const Medians& median) {
                   median("constraint_points_of_a_large_face", "points")));
 }
 
+void limits(const Medians& median) {
+  for (const int n : {10, 32, 100}) {
+    const auto iteration = [&](const std::string& solver) {
+      return median(fmt::format("limit_iteration<{}>/n:{}", solver, n), "cpu_time");
+    };
+    const double projection = iteration("FastProjection");
+    note(fmt::format("an iteration of eq. (27), condensed, {0} x {0}", n),
+         fmt::format("{:.2f} ms", 1e3 * iteration("LagrangeNewton")),
+         fmt::format("one of the projection takes {:.3f} ms", 1e3 * projection));
+    if (n < 100)
+      note(fmt::format("  as the paper writes it, {0} x {0}", n),
+           fmt::format("{:.2f} ms", 1e3 * median(fmt::format("eq_27_as_written/n:{}", n), "cpu_time")),
+           "sparse LU, without assembly and analysis");
+  }
+  for (const int n : {4, 6, 8, 10, 12}) {
+    const auto factor = [&](const char* kind) {
+      return median(fmt::format("small_factor_{}/n:{}", kind, n), "cpu_time");
+    };
+    const double ours = factor("ours"), best = std::min(factor("simplicial"), factor("dense"));
+    row(fmt::format("refactor and solve, {:.0f} rows", median(fmt::format("small_factor_ours/n:{}", n), "rows")),
+        fmt::format("{:.1f} us", 1e6 * ours), fmt::format("<= {:.1f} us", 1e6 * best), ours <= best,
+        "1 core; the better of Eigen's simplicial and dense factors");
+  }
+}
+
 void kidnapped(const std::string& samples) {
   constexpr double frame_target = 2e-3, place_target = 5e-3;
   const auto costs = kidnapped_by_step(samples, {8, 12, 16, 24, 32, 48, 64, 128, 256, 1024});
@@ -128,6 +154,7 @@ int main(int count, char** arguments) {
     for (int k = 2; k < count; ++k) median.read(arguments[k]);
     fmt::print("{:<50} {:>16}  {:<22} {:<7} {}\n", "what", "measured", "target", "", "how");
     functions(median);
+    limits(median);
     kidnapped(arguments[1]);
     growth(arguments[1]);
   } catch (const std::exception& error) {
