@@ -168,6 +168,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   };
   result = result.system ? run(built, std::move(result), hooks) : run(built, hooks);
   console.end_live();
+  for (const std::string& warning : result.warnings) console.warning(warning);
   if (result.accepted) {
     save(*result.accepted, *result.system);
   } else {
@@ -205,9 +206,8 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
                            built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,
                            result.wall_seconds));
   if (built.scene.rest && result.exit == RunExit::ok) {
-    console.note(
-        fmt::format("  at rest after {} steps: let go for half of them, no point swings by more than {:.2g} m",
-                    result.relaxation.steps, result.relaxation.remaining));
+    console.note(fmt::format("  at rest after {} steps: let go for half of them, no point swings by more than {:.2g} m",
+                             result.relaxation.steps, result.relaxation.remaining));
   }
   console.note(
       fmt::format("  strain at most {:.2g} weft, {:.2g} warp; mean {:.2g}, {:.2g}; at constraint points {:.2g}",

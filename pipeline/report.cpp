@@ -113,7 +113,14 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"mean_abs_weft", m.strain.mean_abs[0]},
                       {"mean_abs_warp", m.strain.mean_abs[1]},
                       {"at_constraints_max", m.at_constraints_max}};
-  if (scene.strain_limit.on) report["strain"]["limit"] = scene.strain_limit.tolerance;
+  // One number, or what a band allows: [weft, warp] where the scene names a limit.
+  const StrainLimit& limit = scene.strain_limit;
+  if (limit.on && limit.weft.slack == 0) report["strain"]["limit"] = limit.tolerance;
+  if (limit.on && limit.weft.slack > 0) {
+    report["strain"]["limit"] = {{"compress", {limit.weft.compress, limit.warp.compress}},
+                                 {"tolerance", limit.tolerance}};
+    if (limit.stretched) report["strain"]["limit"]["stretch"] = {limit.weft.stretch, limit.warp.stretch};
+  }
   report["points"] = Json::array();
   for (std::size_t k = 0; k < m.points.size(); ++k) {
     report["points"].push_back(

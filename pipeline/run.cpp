@@ -82,6 +82,8 @@ class Loop {
  private:
   void begin() {
     result_.system = assemble(build_, 0);
+    result_.warnings = result_.system->warnings;
+    warn_of_stiff_limit();
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(build_.start.size());
     result_.state = state_from(*result_.system, build_.start, zero, 0);
     settle();
@@ -96,6 +98,21 @@ class Loop {
     result_.loop.scale = result_.energy.start;
     evaluate_bound();
     result_.loop.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
+  }
+
+  // Nets that don't follow the threads lock where rows are stiff. (analysis/README.md, "Which rows")
+  void warn_of_stiff_limit() {
+    constexpr double much = 100;
+    const StrainLimit& limit = scene_.strain_limit;
+    if (!limit.on || !limit.stiffness) return;
+    for (std::size_t k = 0; k < build_.panels.size(); ++k) {
+      const double usual = default_limit_stiffness(build_, static_cast<int>(k));
+      if (!(*limit.stiffness > much * usual)) continue;
+      result_.warnings.push_back(fmt::format(
+          "strain_limit.stiffness is {:.3g} N/m, {:.3g} times what the loads of panel '{}' ask for: nets across "
+          "the threads may hardly bend",
+          *limit.stiffness, *limit.stiffness / usual, build_.panels[k].name));
+    }
   }
 
   long allocations() const { return hooks_.allocations ? hooks_.allocations() : 0; }
@@ -364,10 +381,10 @@ class Loop {
       where = fmt::format("; the stiffest place is {} ({}), which needs steps below {:.3g} s",
                           describe_cell(build_, bound.cell), bound.bending ? "bending" : "membrane", bound.dt);
     }
-    if (result_.system->projection) {
-      where += fmt::format("; the largest strain violation is {:.3g} {}", result_.last_projection.strain_violation,
-                           worst_place());
-    }
+    const ProjectionReport& p = result_.last_projection;
+    if (p.strain_violation > scene_.strain_limit.tolerance)
+      where += fmt::format("; the strain limit is broken by {:.3g} {}", p.strain_violation, worst_place());
+    if (p.place_violation > 1e-6) where += fmt::format("; a pin is missed by {:.3g} m", p.place_violation);
     result_.reason = fmt::format(
         "at t = {:.6g} s {}{}. Use dt = \"auto\" or a smaller dt, a larger strain_limit.tolerance or regularisation, "
         "or look "

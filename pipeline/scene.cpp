@@ -414,6 +414,12 @@ void read_limit(Table table, Scene& scene) {
   limit.on = !mode || *mode != "off";
   const bool band = mode && *mode == "band";
   table.number(limit.tolerance, "tolerance", dimension::none, Range::positive);
+  constexpr double free = 0.5;  // C = -1/2 is a thread of no length
+  if (limit.tolerance > free)
+    table.fail(
+        *table.raw().get("tolerance"),
+        fmt::format("tolerance in [strain_limit] is {}, must be at most {}: a strain of -{} is a thread of no length",
+                    limit.tolerance, free, free));
   limit.weft = limit.warp = {limit.tolerance, limit.tolerance};
   if (band) {
     const auto stretch = table.vector<2>("stretch", dimension::none),
@@ -421,13 +427,16 @@ void read_limit(Table table, Scene& scene) {
     if (!stretch && !compress)
       throw InputError(table.where() +
                        ": mode = \"band\" needs stretch = [weft, warp], compress = [weft, warp], or both");
-    constexpr double free = 0.5;  // C = -1/2 is a thread of no length
+    limit.stretched = stretch.has_value();
     for (int k : {0, 1}) {
       StrainBand& b = k == 0 ? limit.weft : limit.warp;
       b = {stretch ? (*stretch)[k] : 1e3, compress ? (*compress)[k] : free, band_slack};
       if (!(b.stretch > 0 && b.compress > 0))
         throw InputError(table.where() +
                          ": stretch and compress are strains above 0 in weft and warp, such as [0.05, 0.02]");
+      if (b.compress > free)
+        throw InputError(fmt::format("{}: compress is {}, must be at most {}: a strain of -{} is a thread of no length",
+                                     table.where(), b.compress, free, free));
     }
     if (!table.find("tolerance"))
       limit.tolerance =
@@ -493,6 +502,11 @@ void read_settings(Table& top, Scene& scene) {
   if (auto table = top.table("load", "[load]")) {
     if (const auto v = table->vector<3>("gravity", dimension::acceleration)) scene.gravity = *v;
     if (const auto v = table->vector<3>("wind", dimension::velocity)) scene.wind = *v;
+    // Beyond any cloth; far beyond, energies overflow.
+    constexpr double most = 1e6;
+    if (scene.gravity.norm() > most || scene.wind.norm() > most)
+      throw InputError(
+          fmt::format("{}: gravity and wind in [load] must be below {} m/s2 and m/s", table->where(), most));
     table->done();
   }
   if (auto table = top.table("solver", "[solver]")) read_solver(*table, scene);

@@ -91,10 +91,11 @@ struct StrainLimit {
   bool on = false;
   double tolerance = 0.01;
   StrainBand weft = {}, warp = {};  // "inextensible": both tolerance, without slack
+  bool stretched = false;           // whether a band limits stretch
   std::optional<double> stiffness;  // N/m of force per strain before the wall; unset: chosen by the loads
   LimitSolver solver = LimitSolver::projection;
   ProjectionVariant variant = ProjectionVariant::second_order;  // of the projection
-  double regularisation = 1e-3;  // the default of ProjectionOptions
+  double regularisation = 1e-3;                                 // the default of ProjectionOptions
   int max_iterations = 50;
 };
 

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -115,6 +117,102 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
   return taken;
 }
 
+// A point that others hold already adds nothing, so it is left out: a warning, unless one of them moves.
+std::string held_twice(const Scene& scene, const std::vector<Candidate>& candidates, const std::vector<bool>& taken,
+                       std::size_t k, const Eigen::VectorXd& start) {
+  const ScenePin& pin = scene.pins[static_cast<std::size_t>(candidates[k].pin)];
+  const Eigen::Vector3d at = apply(candidates[k].row, start);
+  const ScenePin* other = nullptr;  // of the nearest place
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t l = 0; l < candidates.size(); ++l) {
+    const double distance = (apply(candidates[l].row, start) - at).norm();
+    if (!taken[l] || candidates[l].pin == candidates[k].pin || !(distance < nearest)) continue;
+    nearest = distance;
+    other = &scene.pins[static_cast<std::size_t>(candidates[l].pin)];
+  }
+  const std::string what =
+      other ? fmt::format("{}: {} and {} ({}), {:.3g} m away, hold the same control points", pin.where, pin.at.text,
+                          other->at.text, other->where, nearest)
+            : fmt::format("{}: {} is held by pins of control points already", pin.where, pin.at.text);
+  if (pin.move || (other && other->move)) throw InputError(what + " and one of them moves");
+  return what + "; the first one is left out";
+}
+
+// Material points that stand for what a pin holds.
+std::vector<Eigen::Vector2d> marks(const Address& at, const NurbsSurface& rest) {
+  const Interval u = rest.u().domain(), v = rest.v().domain();
+  const auto end = [](const Interval& d, int e) { return e == 0 ? d.min : d.max; };
+  if (at.kind == Address::Kind::uv) return {at.uv};
+  if (at.kind == Address::Kind::corner) return {{end(u, at.a), end(v, at.b)}};
+  std::vector<Eigen::Vector2d> points;
+  if (at.kind == Address::Kind::edge) {
+    for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+      points.emplace_back(at.a == 0 ? end(u, at.b) : u.min + s * u.length(),
+                          at.a == 0 ? v.min + s * v.length() : end(v, at.b));
+    }
+  }
+  return points;
+}
+
+// How far two material points of a flat panel can be apart [m]: along threads of weft and warp, which the limit lets
+// stretch so far, from one to the other beside the straight line of the parameter plane. Infinite where that line
+// leaves the material.
+double reach(const Build& build, int panel, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+  const BuiltPanel& built = build.panels[static_cast<std::size_t>(panel)];
+  const StrainLimit& limit = build.scene.strain_limit;
+  constexpr int parts = 32;
+  double sum = 0;
+  for (int k = 0; k < parts; ++k) {
+    const Eigen::Vector2d step = (to - from) / parts, middle = from + (k + 0.5) * step;
+    if (!in_material(built.face, built.topology, middle)) return std::numeric_limits<double>::infinity();
+    const SurfaceJet jet = evaluate(shell.rest, middle.x(), middle.y());
+    const Eigen::Vector3d normal = jet.u.cross(jet.v).normalized(), along = jet.u * step.x() + jet.v * step.y();
+    const Eigen::Vector3d weft = Eigen::AngleAxisd(shell.grain, normal) * *shell.straight_u;
+    const double weft_part = along.dot(weft), warp_part = (along - weft_part * weft).norm();
+    sum +=
+        std::abs(weft_part) * std::sqrt(1 + 2 * limit.weft.stretch) + warp_part * std::sqrt(1 + 2 * limit.warp.stretch);
+  }
+  return sum;
+}
+
+// Pins that the scene itself pulls farther apart than the strain limit allows, from time t on.
+template <class Moved>
+void refuse_out_of_reach(const Build& build, double t, const Moved& moved) {
+  const Scene& scene = build.scene;
+  if (!scene.strain_limit.on) return;
+  constexpr int moments = 32;
+  for (std::size_t a = 0; a < scene.pins.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      const ScenePin &p = scene.pins[a], &q = scene.pins[b];
+      if (p.panel != q.panel || !(p.move || q.move)) continue;
+      const int panel = build.panel(p.panel);
+      const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+      if (!shell.straight_u) continue;
+      double end = std::max(p.move ? p.move->end : 0, q.move ? q.move->end : 0);
+      for (const ScenePin* pin : {&p, &q}) end = std::min(end, pin->release.value_or(end));
+      end = std::min(end, scene.until);
+      const NurbsSurface start = shell.rest.with_points(build.net(panel, build.start));
+      for (const Eigen::Vector2d& from : marks(p.at, shell.rest)) {
+        for (const Eigen::Vector2d& to : marks(q.at, shell.rest)) {
+          const double longest = reach(build, panel, from, to);
+          for (int k = 1; k <= moments && t < end; ++k) {
+            const double time = t + (end - t) * k / moments;
+            const double apart = (moved(static_cast<int>(a), start(from.x(), from.y()), time) -
+                                  moved(static_cast<int>(b), start(to.x(), to.y()), time))
+                                     .norm();
+            if (!(apart > longest * (1 + 1e-9))) continue;
+            throw InputError(fmt::format(
+                "{}: pins {} ({}) and {} ({}) are {:.4g} m apart at t = {:.3g} s, but the cloth between them reaches "
+                "{:.4g} m within the strain limit",
+                p.where, b, q.at.text, a, p.at.text, apart, time, longest));
+          }
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 double extent(const ShellPanel& panel) {
@@ -128,9 +226,12 @@ double extent(const ShellPanel& panel) {
 }
 
 double limit_stiffness(const Build& build, int panel) {
+  return build.scene.strain_limit.stiffness.value_or(default_limit_stiffness(build, panel));
+}
+
+double default_limit_stiffness(const Build& build, int panel) {
   const Scene& scene = build.scene;
   const StrainLimit& limit = scene.strain_limit;
-  if (limit.stiffness) return *limit.stiffness;
   constexpr double reserve = 10;
   const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
   double load = shell.fabric.density * scene.gravity.norm() * extent(shell);
@@ -221,6 +322,8 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     const auto& move = scene.pins[static_cast<std::size_t>(pin)].move;
     return move ? (*move)(from, mean[static_cast<std::size_t>(pin)], time) : from;
   };
+  refuse_out_of_reach(build, t, moved);
+
   std::vector<int> control_points;
   std::vector<Eigen::Vector3d> places;
   for (const Held& h : fixed) {
@@ -251,10 +354,11 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
   const std::vector<bool> taken = independent(candidates, *system->map, dynamic.node_mass);
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     Candidate& c = candidates[k];
-    if (!taken[k]) continue;
     const Eigen::Vector3d from = apply(c.row, build.start);
+    if (!taken[k] && c.required) system->warnings.push_back(held_twice(scene, candidates, taken, k, build.start));
+    if (!taken[k]) continue;
     const int pin = c.pin;
-    rows.place.push_back({std::move(c.row), pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
+    rows.place.push_back({c.row, pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
     system->place_pin.push_back(pin);
   }
   for (const BuiltPanel& panel : build.panels) {

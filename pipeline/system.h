@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pipeline/build.h"
@@ -17,6 +18,7 @@ struct System {
 
   std::vector<int> fixed_pin;                        // pin of each fixed control point, in map order
   std::vector<std::vector<ConstraintPoint>> points;  // per panel: which the projection takes, and why not
+  std::vector<std::string> warnings;                 // pins that hold what others hold
   int strain_rows = 0, place_rows = 0;
   std::vector<int> place_pin;  // pin of each place row
   std::unique_ptr<AffineMap> map;
@@ -30,9 +32,11 @@ double extent(const ShellPanel& panel);
 // Stiffness of the strain limit of a panel [N/m]: the scene's, else one that strains by a tenth of the narrowest limit
 // under the panel's whole weight or the largest traction, and is at least ten times the fabric's own.
 double limit_stiffness(const Build& build, int panel);
+double default_limit_stiffness(const Build& build, int panel);
 
 // Pins released at or before t are left out. Throws InputError where two pins hold one control point and move apart,
-// GeometryError for places that don't exist, SolverError where place rows contradict each other.
+// or farther than the cloth between them reaches, GeometryError for places that don't exist, SolverError where place
+// rows contradict each other.
 std::unique_ptr<System> assemble(const Build& build, double t);
 
 // State that continues control points q with velocities v (3 n each) under this system at time t.

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int steps_per_halt = 10;
 constexpr double smaller_share = 0.7, smallest_share = 0.1;
-constexpr int least_window = 50, windows_at_least = 10;  // of the run so far
+constexpr int least_window = 50, least_trial = 500, windows_at_least = 10;  // of the run so far
 
 // Largest distance between control points that carry cloth.
 double largest_move(const DynamicSystem& system, const Eigen::VectorXd& from, const Eigen::VectorXd& to) {
@@ -21,7 +21,7 @@ double largest_move(const DynamicSystem& system, const Eigen::VectorXd& from, co
 
 void begin(Relaxation& r, bool trial, const Eigen::VectorXd& q) {
   r.trial = trial;
-  r.length = trial ? std::max(least_window, r.steps) : std::max(least_window, r.steps / windows_at_least);
+  r.length = trial ? std::max(least_trial, r.steps) : std::max(least_window, r.steps / windows_at_least);
   r.count = 0;
   r.moved = 0;
   r.halts_before = r.halts;

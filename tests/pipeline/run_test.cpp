@@ -291,6 +291,50 @@ TEST(Run, AStepAboveTheBoundIsHalvedAndTheRunGoesOn) {
   EXPECT_LE(result.dt_min, dt / 2);
 }
 
+std::string scene_refusal(const Folder& folder, const std::string& text) {
+  try {
+    assemble(built(folder, test::sheet("cloth"), text), 0);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Run, PinsThatGoFartherThanTheClothReachesAreRefused) {
+  const Folder folder("reach");
+  const auto pulled = [&](const char* a, const char* b, double by, const std::string& limit = "") {
+    std::string text = test::scene_text(std::string("[[pin]]\nat = \"") + a + "\"\n[[pin]]\nat = \"" + b +
+                                        "\"\nmove = { translate = [" + std::to_string(by) + ", 0, 0], end = 0.05 }\n");
+    if (!limit.empty()) text.replace(text.find("tolerance = 0.01"), 16, limit);
+    return scene_refusal(folder, text);
+  };
+  // 0.4 m of cloth reaches 0.404 m.
+  EXPECT_NE(pulled("edge:u0", "edge:u1", 0.006).find("m apart at t = "), std::string::npos);
+  EXPECT_EQ(pulled("edge:u0", "edge:u1", 0.0035), "accepted");
+  EXPECT_EQ(pulled("edge:u0", "edge:u1", 0.006, "mode = \"off\""), "accepted");
+  EXPECT_EQ(pulled("edge:u0", "edge:u1", 0.006, "mode = \"band\"\nstretch = [0.02, 0.001]"), "accepted");
+  EXPECT_EQ(pulled("edge:u0", "edge:u1", 0.006, "mode = \"band\"\ncompress = [0.02, 0.001]"), "accepted");
+  EXPECT_NE(pulled("uv:160,200", "uv:240,200", 0.002).find("within the strain limit"), std::string::npos);
+  EXPECT_EQ(pulled("uv:160,200", "uv:240,200", -0.02), "accepted");
+  // Across the threads shear gives: from corner to corner they reach 0.8 m.
+  EXPECT_EQ(pulled("corner:0,0", "corner:1,1", 0.1), "accepted");
+  EXPECT_NE(pulled("corner:0,0", "corner:1,1", 0.4).find("apart"), std::string::npos);
+}
+
+TEST(Run, APlaceHeldTwiceIsSaid) {
+  const Folder folder("twice");
+  const auto with = [](const std::string& move) {
+    return test::scene_text("[[pin]]\nat = \"uv:200,200\"\n[[pin]]\nat = \"uv:200,200.0001\"\n" + move);
+  };
+  const auto system = assemble(built(folder, test::sheet("cloth"), with("")), 0);
+  ASSERT_EQ(system->warnings.size(), 1u);
+  EXPECT_NE(system->warnings[0].find("hold the same control points"), std::string::npos) << system->warnings[0];
+  EXPECT_NE(scene_refusal(folder, with("move = { translate = [0, 0, 0.01], end = 0.05 }\n")), "accepted");
+  std::string free = with("move = { translate = [0, 0, 0.01], end = 0.05 }\n");
+  free.replace(free.find("tolerance = 0.01"), 16, "mode = \"off\"");
+  EXPECT_NE(scene_refusal(folder, free).find("one of them moves"), std::string::npos);
+}
+
 TEST(Run, StoppingLeavesAWholeResult) {
   const Folder folder("stop");
   const Build b = built(folder, test::sheet("cloth"), test::scene_text(corner_pins));
