@@ -1,8 +1,10 @@
 #include "trimming/contacts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 
@@ -116,7 +118,7 @@ class Finder {
     for (const int b : order) {
       std::erase_if(active, [&](int a) { return piece(a).box.max.x() + margin_ < piece(b).box.min.x(); });
       for (const int a : active) {
-        if (boxes_apart(piece(a).box, piece(b).box)) continue;
+        if (boxes_apart(piece(a).box, piece(b).box) || level_and_curve(piece(a), piece(b))) continue;
         if (next_[static_cast<std::size_t>(a)] == b) {
           joined(piece(a), piece(b));
         } else if (next_[static_cast<std::size_t>(b)] == a) {
@@ -274,6 +276,64 @@ class Finder {
     add_contact(a, b, a0 == 0 ? a.first() : a1 == 0 ? a.last() : b0 == 0 ? b.first() : b.last());
   }
 
+  // A straight span along a line of constant u or v against a curved one, decided exactly: by the signs of the curve's
+  // coordinates at its roots on that line, and of what precedes and follows it where it ends there. False: no such
+  // pair, or one that meets at an end of the straight span, where this says too little.
+  bool level_and_curve(const Piece& a, const Piece& b) {
+    if (a.straight() == b.straight()) return false;
+    const Piece &line = a.straight() ? a : b, &curve = a.straight() ? b : a;
+    const auto [known, added] = level_pairs_.try_emplace({line.loop, line.link, curve.loop, curve.link}, false);
+    if (added) known->second = decide_level(line, curve);
+    return known->second;
+  }
+
+  bool decide_level(const Piece& line, const Piece& curve) {
+    const TrimSpan& l = chain(line)[static_cast<std::size_t>(line.link)];
+    const std::vector<TrimSpan>& links = chain(curve);
+    const std::size_t n = links.size(), k = static_cast<std::size_t>(curve.link);
+    const TrimSpan& c = links[k];
+    const bool upright = l.u[0] == l.u[1];
+    if (!upright && l.v[0] != l.v[1]) return false;
+    const Axis across = upright ? Axis::u : Axis::v, along = upright ? Axis::v : Axis::u;
+    const double at = upright ? l.u[0] : l.v[0];
+    const auto [low, high] = upright ? std::minmax(l.v[0], l.v[1]) : std::minmax(l.u[0], l.u[1]);
+    const LineForm form(c, across, at);
+    if (form.zero()) return false;
+    std::vector<std::pair<ContactKind, Vector2d>> found;
+    for (LineRoot& root : roots(form, counts_)) {
+      const int above = sign_at_root(LineForm(c, along, low), form, root, counts_);
+      const int below = sign_at_root(LineForm(c, along, high), form, root, counts_);
+      if (above == 0 || below == 0) return false;
+      if (above > 0 && below < 0)
+        found.emplace_back(root.crosses ? ContactKind::crossing : ContactKind::touch, c.at(root.s()));
+    }
+    for (const bool end : {false, true}) {
+      if (form.coefficient_sign(end ? c.degree : 0) != 0) continue;
+      const Vector2d x = end ? c.last() : c.first();
+      const double place = upright ? x.y() : x.x();
+      if (place < low || place > high) continue;
+      if (place == low || place == high) {
+        // The joint of neighbours is no contact.
+        const std::size_t beside = static_cast<std::size_t>(line.link);
+        if (line.loop == curve.loop && beside == (k + (end ? 1 : n - 1)) % n) continue;
+        return false;
+      }
+      const LineForm beyond(links[(k + (end ? 1 : n - 1)) % n], across, at);
+      const int here = end ? form.sign_before_end() : form.sign_after_start();
+      const int there = end ? beyond.sign_after_start() : beyond.sign_before_end();
+      found.emplace_back(here * there < 0   ? ContactKind::crossing
+                         : here * there > 0 ? ContactKind::touch
+                                            : ContactKind::overlap,
+                         x);
+    }
+    for (const auto& [kind, x] : found) {
+      const bool listed = std::ranges::any_of(
+          places_, [&, &y = x](const Vector2d& known) { return (known - y).cwiseAbs().maxCoeff() <= cluster_; });
+      if (kind != ContactKind::touch || !listed) add(kind, line, curve, x);
+    }
+    return true;
+  }
+
   // a ends where b starts.
   void joined(const Piece& a, const Piece& b) {
     if (overlapped_) return;
@@ -381,6 +441,8 @@ class Finder {
   std::vector<std::vector<TrimSpan>> chains_;  // spans of each loop in its direction
   std::vector<Piece> pieces_;
   std::vector<int> next_;
+  std::map<std::array<int, 4>, bool> level_pairs_;  // loop and link of the straight span, of the curved: decided
+  PredicateCounts counts_;
   std::vector<LoopContact> contacts_;
   std::vector<Vector2d> places_;  // of the contacts, scaled
   Vector2d scale_{1, 1};

@@ -15,10 +15,11 @@ struct LoopContact {
   Eigen::Vector2d uv{0, 0};
 };
 
-// Contacts other than the joints of neighbouring curves. Straight segments are compared exactly; curved ones are
-// subdivided until their hulls part by more than rounding (8 eps of the largest coordinate), so that a distance below
-// some 64 eps counts as a contact, and contacts within 1e-7 of the loops' size of one another are listed once; a cusp
-// is looked at down to that size.
+// Contacts other than the joints of neighbouring curves. Straight segments are compared exactly, and so are curves with
+// segments along lines of constant u or v, but for contacts at such a segment's end. Other pairs are subdivided until
+// their hulls part by more than rounding (8 eps of the largest coordinate), so that a distance below some 64 eps counts
+// as a contact, and contacts within 1e-7 of the loops' size of one another are listed once; a cusp is looked at down to
+// that size.
 std::vector<LoopContact> find_contacts(const std::vector<TrimLoop>& loops, const TrimSpans& spans);
 
 }  // namespace toile

@@ -32,6 +32,12 @@ std::string replayed(const File& file, const Entry& e) {
   if (regular) return std::string(file.record(e));
   Tokens tokens;
   tokenize(file.record(e), file.delimiters, tokens);
+  if (!tokens.terminated) {
+    // No end is put to a record that has none: it would say something else.
+    std::string lines(file.record(e));
+    lines.resize((lines.size() + 63) / 64 * 64, ' ');
+    return lines;
+  }
   // Also where the record says another type than its entry: it stays as wrong as it was.
   const std::optional<int> type = tokens.list.empty() ? std::nullopt : parse_integer(tokens.list[0].text);
   Record record(type.value_or(0), file.delimiters);

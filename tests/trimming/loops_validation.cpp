@@ -1,4 +1,6 @@
 // What validation repairs, reports and refuses.
+#include <limits>
+
 #include "geometry/error.h"
 #include "trims.h"
 
@@ -227,6 +229,39 @@ TEST(LoopValidation, UnclampedCurvesGetTheirEnds) {
   TrimmedSurface face = with_outline(loop_of({Curve2(KnotVector(2, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}), points)}));
   validate_loops(face);
   expect_laws(face, trace_trims(face));
+}
+
+// A hole whose parabola hangs down to v = 0.5, the lower edge of the square, or to one rounding above or below.
+TrimmedSurface hanging_hole(double middle, bool in_two, bool turned) {
+  std::vector<Curve2> curves;
+  if (in_two) {
+    curves.push_back(bezier_curve({{1, 1.5}, {1.5, middle}, {2, middle}}));
+    curves.push_back(bezier_curve({{2, middle}, {2.5, middle}, {3, 1.5}}));
+  } else {
+    curves.push_back(bezier_curve({{1, 1.5}, {2, 2 * middle - 1.5}, {3, 1.5}}));
+  }
+  curves.push_back(line_segment<2>({3, 1.5}, {1, 1.5}));
+  TrimmedSurface face = with_outline(polygon_loop(square));
+  face.loops.push_back(loop_of(curves, LoopKind::hole));
+  face.loops[1].index = 1;
+  if (turned)
+    for (TrimLoop& loop : face.loops)
+      for (TrimCurve& c : loop.curves)
+        c.curve = Curve2(c.curve.knots(), c.curve.points().colwise().reverse(), c.curve.weights());
+  return face;
+}
+
+TEST(LoopValidation, ATouchOfAnEdgeIsToldFromACrossingAndFromNoneByOneRounding) {
+  constexpr double rounding = std::numeric_limits<double>::epsilon() / 2;
+  for (const bool in_two : {false, true})
+    for (const bool turned : {false, true}) {
+      SCOPED_TRACE(std::string(in_two ? "two curves" : "one curve") + (turned ? ", turned" : ""));
+      TrimmedSurface touching = hanging_hole(0.5, in_two, turned);
+      EXPECT_TRUE(reports(validate_loops(touching), "touches"));
+      TrimmedSurface clear = hanging_hole(0.5 + rounding, in_two, turned);
+      EXPECT_FALSE(reports(validate_loops(clear), "touches"));
+      expect_error(hanging_hole(0.5 - rounding, in_two, turned), {"crosses"});
+    }
 }
 
 }  // namespace
