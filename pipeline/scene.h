@@ -11,6 +11,7 @@
 
 #include "analysis/fabric/fabric.h"
 #include "analysis/projection/fast_projection.h"
+#include "analysis/projection/point_rule.h"
 #include "pipeline/addresses.h"
 
 namespace toile {
@@ -92,9 +93,10 @@ struct StrainLimit {
   double tolerance = 0.01;
   StrainBand weft = {}, warp = {};  // "inextensible": both tolerance, without slack
   std::optional<double> stiffness;  // N/m of force per strain before the wall; unset: chosen by the loads
+  PointRule points = PointRule::greville_derivative;  // at p = 2 the knot mesh
   LimitSolver solver = LimitSolver::projection;
   ProjectionVariant variant = ProjectionVariant::second_order;  // of the projection
-  double regularisation = 1e-3;  // the default of ProjectionOptions
+  double regularisation = 1e-3;                                 // the default of ProjectionOptions
   int max_iterations = 50;
 };
 
