@@ -32,6 +32,8 @@ struct FramePanel {
   std::vector<bool> carries_cloth;  // per control point; empty: all do
   std::span<const ConstraintPoint> points;
   std::vector<Eigen::Vector2d> point_strain;  // weft, warp at `points`; empty: not known
+  // Nominal stress at `points` [N/m]: smoothed weft, warp, then as it is at the point itself; empty: not known.
+  std::vector<Eigen::Vector4d> point_stress;
 };
 
 struct Frame {

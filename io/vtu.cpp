@@ -9,6 +9,7 @@
 #include <charconv>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 #include <type_traits>
 
@@ -334,8 +335,15 @@ Grid point_block(const Frame& frame) {
   Array<float> weft{"strain_weft", 1, {}}, warp{"strain_warp", 1, {}};
   Array<std::int32_t> kind{"kind", 1, {}}, used{"used", 1, {}}, loop{"loop", 1, {}}, curve{"curve", 1, {}},
       panel_number{"panel", 1, {}};
-  bool strained = true;
-  for (const FramePanel& panel : frame.panels) strained &= panel.point_strain.size() == panel.points.size();
+  std::array<Array<float>, 4> stress{{{"nominal_stress_weft", 1, {}},
+                                      {"nominal_stress_warp", 1, {}},
+                                      {"raw_nominal_stress_weft", 1, {}},
+                                      {"raw_nominal_stress_warp", 1, {}}}};
+  bool strained = true, stressed = true;
+  for (const FramePanel& panel : frame.panels) {
+    strained &= panel.point_strain.size() == panel.points.size();
+    stressed &= panel.point_stress.size() == panel.points.size();
+  }
   for (std::size_t k = 0; k < frame.panels.size(); ++k) {
     const FramePanel& panel = frame.panels[k];
     for (std::size_t i = 0; i < panel.points.size(); ++i) {
@@ -354,9 +362,12 @@ Grid point_block(const Frame& frame) {
         weft.values.push_back(static_cast<float>(panel.point_strain[i][0]));
         warp.values.push_back(static_cast<float>(panel.point_strain[i][1]));
       }
+      for (int c = 0; stressed && c < 4; ++c)
+        stress[static_cast<std::size_t>(c)].values.push_back(static_cast<float>(panel.point_stress[i][c]));
     }
   }
   if (strained) grid.point_fields = {std::move(weft), std::move(warp)};
+  if (stressed) std::ranges::move(stress, std::back_inserter(grid.point_fields));
   grid.point_reals.push_back(std::move(uv));
   grid.point_reals.push_back(std::move(t));
   grid.point_integers = {std::move(kind), std::move(used), std::move(loop), std::move(curve), std::move(panel_number)};

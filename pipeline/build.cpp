@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "analysis/extension.h"
-#include "analysis/projection/point_rule.h"
+#include "analysis/projection/averaged_rows.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "geometry/refine.h"
@@ -216,7 +216,8 @@ struct PanelParts {
   AffineMap::Matrix dependence;
 };
 
-PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vector<std::string>& warnings) {
+PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule sampling,
+                       std::vector<std::string>& warnings) {
   const std::string who = fmt::format("{}: panel '{}'", panel.where, panel.name);
   PanelParts parts;
   BuiltPanel& built = parts.built;
@@ -236,7 +237,7 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
   CutQuadrature rule = quadrature(built.face, built.topology);
   if (!(rule.area > 0)) throw GeometryError(who + ": the trim leaves no material");
   built.points = constraint_points(built.face, built.topology);
-  built.extra_points = points_for_degree(built.face, built.topology, PointRule::border, built.closure);
+  built.extra_points = apply_rule(sampling, built.face, built.topology, built.points, built.closure);
   for (auto* points : {&built.points, &built.extra_points}) {
     merge_over_seams(built.face.surface, built.closure, *points);
   }
@@ -253,7 +254,8 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, std::vect
   if (built.smooth_seams.any()) {
     extension.rest = extension.rest.with_points(extension.rest.points() * parts.dependence.transpose());
     drop_strips(built.face.surface, built.smooth_seams, kinks);
-    drop_extra_points(built.face.surface, built.smooth_seams, built.extra_points);
+    if (sampling == PointRule::border || sampling == PointRule::greville_derivative)
+      drop_extra_points(built.face.surface, built.smooth_seams, built.extra_points);
   }
   parts.start = extension.rest.points();
   if (panel.start) {
@@ -320,7 +322,8 @@ Build build(Scene scene) {
   std::vector<Eigen::Matrix3Xd> starts;
   int count = 0;
   for (std::size_t k = 0; k < file_of.size(); ++k) {
-    PanelParts parts = build_panel(result.files[file_of[k]], result.scene.panels[k], result.warnings);
+    PanelParts parts = build_panel(result.files[file_of[k]], result.scene.panels[k], result.scene.strain_limit.points,
+                                   result.warnings);
     for (int row = 0; row < parts.dependence.outerSize(); ++row) {
       for (AffineMap::Matrix::InnerIterator it(parts.dependence, row); it; ++it) {
         dependence.emplace_back(count + static_cast<int>(it.row()), count + static_cast<int>(it.col()), it.value());
@@ -343,6 +346,13 @@ Build build(Scene scene) {
   result.dependence.resize(count, count);
   result.dependence.setFromTriplets(dependence.begin(), dependence.end());
   result.model = std::make_unique<ShellModel>(std::move(shells));
+  if (result.scene.strain_limit.on) {
+    for (std::size_t k = 0; k < result.panels.size(); ++k) {
+      BuiltPanel& panel = result.panels[k];
+      panel.mean_rows = averaged_rows(*result.model, static_cast<int>(k), panel.topology, panel.closure,
+                                      result.scene.strain_limit.points);
+    }
+  }
   result.trim_seconds = since(trimming);
 
   result.start.resize(3 * count);

@@ -8,6 +8,7 @@
 
 #include "analysis/affine_map.h"
 #include "analysis/dynamics/verlet.h"
+#include "analysis/projection/constraint_rows.h"
 #include "analysis/shell/shell_model.h"
 #include "analysis/smooth_seam.h"
 #include "geometry/closure.h"
@@ -28,7 +29,8 @@ struct BuiltPanel {
   TrimmedSurface face;
   TrimTopology topology;
   std::vector<ConstraintPoint> points;        // the listed ones
-  std::vector<ConstraintPoint> extra_points;  // of the projection only: at degree 3 and above, and at pinned uv points
+  std::vector<ConstraintPoint> extra_points;  // of the projection only: by strain_limit.points, and at pinned uv points
+  std::vector<StrainRow> mean_rows;           // by strain_limit.points: averaged_rows()
   std::vector<LoopRepair> repairs;
   Closure closure;                  // directions in which the surface closes on itself: glued at its seam
   std::vector<int> leader;          // per control point: the one that stands for it, see seam_leaders()
@@ -36,12 +38,6 @@ struct BuiltPanel {
   std::vector<bool> carries_cloth;  // per control point
   std::vector<int> extended;        // control points with too little cloth that follow their neighbours
   double extension_deviation = 0;   // m, of the rest surface inside the material
-
-  // What a StrainRow's `point` means: the listed points, then the extra ones.
-  const ConstraintPoint& strain_point(int k) const {
-    const std::size_t i = static_cast<std::size_t>(k);
-    return i < points.size() ? points[i] : extra_points[i - points.size()];
-  }
 };
 
 // Everything of a run that doesn't change with pins being released.

@@ -93,6 +93,7 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   panel.active_control_points = active_control_points(panel.face.surface, panel.topology);
   const Closure closure = find_closure(panel.face.surface, same_place(panel.face.resolution, panel.face.surface));
   merge_over_seams(close_exactly(panel.face.surface, closure), closure, panel.points);
+  apply_rule(StrainLimit{}.points, panel.face, panel.topology, panel.points, closure);
   merge_near_points(panel.face.surface, panel.points);
   return panel;
 }

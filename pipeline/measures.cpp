@@ -5,47 +5,101 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
+
+#include "analysis/projection/stress_recovery.h"
 
 namespace toile {
 namespace {
 
-double percentile(const std::vector<double>& values, const std::vector<GridSample>& samples, double fraction) {
+double percentile(const std::vector<double>& values, const std::vector<double>& weights, double fraction) {
   std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [&](std::size_t k) { return values[k]; });
-  double total = 0;
-  for (const GridSample& s : samples) total += s.weight;
+  const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
   double below = 0;
   for (const std::size_t k : order) {
-    below += samples[k].weight;
+    below += weights[k];
     if (below >= fraction * total) return values[k];
   }
   return values.empty() ? 0 : values[order.back()];
 }
 
+// Of one direction, c.
+void extremes(const std::vector<double>& x, const std::vector<double>& weights, int c, Extremes& e) {
+  if (x.empty()) return;
+  double total = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    total += weights[k];
+    e.mean[c] += weights[k] * x[k];
+    e.mean_abs[c] += weights[k] * std::abs(x[k]);
+  }
+  e.mean[c] /= total;
+  e.mean_abs[c] /= total;
+  e.min[c] = *std::ranges::min_element(x);
+  e.max[c] = *std::ranges::max_element(x);
+  e.p999[c] = percentile(x, weights, 0.999);
+}
+
 Extremes extremes(const std::vector<Eigen::Vector2d>& values, const std::vector<GridSample>& samples) {
   Extremes e;
-  if (values.empty()) return e;
+  std::vector<double> weights, x(values.size());
+  for (const GridSample& s : samples) weights.push_back(s.weight);
   for (int c = 0; c < 2; ++c) {
-    std::vector<double> x(values.size());
-    double total = 0;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      x[k] = values[k][c];
-      const double w = samples[k].weight;
-      total += w;
-      e.mean[c] += w * x[k];
-      e.mean_abs[c] += w * std::abs(x[k]);
-    }
-    e.mean[c] /= total;
-    e.mean_abs[c] /= total;
-    e.min[c] = *std::ranges::min_element(x);
-    e.max[c] = *std::ranges::max_element(x);
-    e.p999[c] = percentile(x, samples, 0.999);
+    std::ranges::transform(values, x.begin(), [c](const Eigen::Vector2d& value) { return value[c]; });
+    extremes(x, weights, c, e);
   }
   return e;
 }
 
+// What eq. 37 gives at the rows themselves.
+void measure_rows(const ConstraintRows& rows, const std::vector<ThreadStress>& stress, StateMeasures& m) {
+  std::vector<double> nominal[2], second_pk[2], weights[2];
+  for (std::size_t r = 0; r < stress.size(); ++r) {
+    const int c = rows.strain[r].warp ? 1 : 0;
+    nominal[c].push_back(stress[r].nominal);
+    second_pk[c].push_back(stress[r].second_pk);
+    weights[c].push_back(rows.strain[r].area);
+  }
+  for (int c = 0; c < 2; ++c) {
+    extremes(nominal[c], weights[c], c, m.raw_nominal);
+    extremes(second_pk[c], weights[c], c, m.raw_second_pk);
+  }
+}
+
+// Energy of the fabric's weft and warp strain over the cloth less that of the strains that the rows see: what hourglass
+// modes hold.
+double unseen_energy(const Build& build, const System& system, const Eigen::VectorXd& q) {
+  const ShellModel& model = *build.model;
+  double energy = 0;
+  for (std::size_t k = 0; k < model.panels().size(); ++k) {
+    const ShellPanel& panel = model.panels()[k];
+    for (std::size_t p = 0; p < panel.quadrature.points.size(); ++p) {
+      const Eigen::Vector2d& uv = panel.quadrature.points[p];
+      const SurfaceJet jet = evaluate(panel.rest, uv.x(), uv.y());
+      const ShellState at = model.state(static_cast<int>(k), uv.x(), uv.y(), q);
+      energy += 0.5 * panel.quadrature.weights[p] * jet.u.cross(jet.v).norm() *
+                at.second_pk.head<2>().dot(at.strain.head<2>());
+    }
+  }
+  for (const StrainRow& row : system.projection->rows().strain) {
+    const Fabric& fabric = model.panels()[static_cast<std::size_t>(row.panel)].fabric;
+    const double k = row.warp ? fabric.membrane.warp : fabric.membrane.weft,
+                 c = 0.5 * (apply(row.row, q).squaredNorm() - 1);
+    energy -= 0.5 * k * row.area * c * c;
+  }
+  return std::max(energy, 0.0);
+}
+
 }  // namespace
+
+Eigen::VectorXd row_forces(const System& system, double dt) {
+  const Eigen::VectorXd& multipliers = system.projection->strain_multipliers();
+  Eigen::VectorXd forces = Eigen::VectorXd::Zero(multipliers.size());
+  for (Eigen::Index r = 0; dt > 0 && r < forces.size(); ++r)
+    forces[r] = std::copysign(system.projection->strain_impulses().col(r).norm(), multipliers[r]) / (dt * dt);
+  return forces;
+}
 
 Eigen::Vector3d up(const Scene& scene) {
   const double g = scene.gravity.norm();
@@ -77,6 +131,14 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   const Eigen::VectorXd q = control_points(system, state);
   const std::vector<GridSample> samples = grid_samples(build);
   std::vector<Eigen::Vector2d> strain, nominal, second_pk;
+  std::optional<StressField> field;
+  if (system.strain_rows > 0) {
+    const ConstraintRows& rows = system.projection->rows();
+    const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, dt), q);
+    field.emplace(model, rows, stress);
+    measure_rows(rows, stress, m);
+    m.unseen_energy = unseen_energy(build, system, q);
+  }
   const Eigen::Vector3d axis = up(build.scene);
   m.lowest = std::numeric_limits<double>::max();
   m.highest = std::numeric_limits<double>::lowest();
@@ -87,8 +149,14 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   for (const GridSample& s : samples) {
     const ShellState at = model.state(s.panel, s.uv.x(), s.uv.y(), q);
     strain.emplace_back(at.strain.head<2>());
-    nominal.push_back(at.nominal);
-    second_pk.emplace_back(at.second_pk.head<2>());
+    if (field) {
+      const auto [weft, warp] = field->at(s.panel, s.uv.x(), s.uv.y(), q);
+      second_pk.emplace_back(weft.second_pk, warp.second_pk);
+      nominal.emplace_back(weft.nominal, warp.nominal);
+    } else {
+      nominal.push_back(at.nominal);
+      second_pk.emplace_back(at.second_pk.head<2>());
+    }
     reach(at.position);
     const Eigen::Vector3d start = model.state(s.panel, s.uv.x(), s.uv.y(), build.start).position;
     m.largest_deflection = std::max(m.largest_deflection, (at.position - start).norm());
@@ -107,13 +175,8 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
     }
   }
   if (system.projection) {
-    for (const StrainRow& row : system.projection->rows().strain) {
-      Eigen::Vector3d y = Eigen::Vector3d::Zero();
-      for (std::size_t a = 0; a < row.row.index.size(); ++a) {
-        y += row.row.value[a] * q.segment<3>(3 * row.row.index[a]);
-      }
-      m.at_constraints_max = std::max(m.at_constraints_max, std::abs(0.5 * (y.squaredNorm() - 1)));
-    }
+    for (const StrainRow& row : system.projection->rows().strain)
+      m.at_constraints_max = std::max(m.at_constraints_max, std::abs(0.5 * (apply(row.row, q).squaredNorm() - 1)));
   }
   for (const ShellPanel& panel : model.panels()) {
     for (std::size_t k = 0; k < panel.quadrature.points.size(); ++k) {

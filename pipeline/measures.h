@@ -24,8 +24,10 @@ struct Extremes {
 
 struct StateMeasures {
   Extremes strain;                         // E11, E22
-  Extremes nominal;                        // N/m, membrane part
-  Extremes second_pk;                      // N/m, membrane part
+  Extremes nominal;                        // N/m, the fabric's and what the strain limit carries, smoothed [eq. 37]
+  Extremes second_pk;                      // N/m, likewise
+  Extremes raw_nominal, raw_second_pk;     // N/m, at the limit's rows as they are, by their areas; 0 without a limit
+  double unseen_energy = 0;                // J, of weft and warp strain of the fabric between the limit's rows
   double at_constraints_max = 0;           // largest |E| of the strain rows taken (of all points where no limit is on)
   double lowest = 0, highest = 0;          // m, along the scene's "up" (against gravity; z without gravity)
   double largest_deflection = 0;           // m, of the grid's points from where the run started
@@ -33,7 +35,11 @@ struct StateMeasures {
   std::vector<Eigen::Vector3d> points;     // those that the scene asks for [m]
   std::vector<Eigen::Vector3d> reactions;  // per pin: force on the cloth [N]
 };
+// `dt`: of the last step [s], 0 before the first, where nothing is known of the forces of pins and limits.
 StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt);
+
+// Force [N m] of each strain row in the last step, for row_stress().
+Eigen::VectorXd row_forces(const System& system, double dt);
 
 // Unit vector against gravity; z where there is none.
 Eigen::Vector3d up(const Scene& scene);

@@ -6,6 +6,7 @@
 #include <array>
 #include <optional>
 
+#include "analysis/projection/stress_recovery.h"
 #include "geometry/error.h"
 #include "io/file.h"
 #include "io/obj.h"
@@ -90,15 +91,48 @@ struct FrameWriter::Impl {
   std::vector<std::unique_ptr<FrameSink>> sinks;
   bool iges = false;
 
-  // Deformed panels with fields; surfaces are kept alive beside them.
+  // Deformed panels with fields; surfaces and points are kept alive beside them.
   struct Shown {
     std::vector<NurbsSurface> surfaces;
+    std::vector<std::vector<ConstraintPoint>> points;
     std::vector<FramePanel> panels;
   };
-  Shown show(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd* velocity) const {
+
+  // Nominal stress of points as it is there: the fabric's, and what the rows there carry.
+  std::vector<std::vector<Eigen::Vector2d>> raw_stress(const Shown& shown, const ConstraintRows& rows,
+                                                       const std::vector<ThreadStress>& stress,
+                                                       const Eigen::VectorXd& q) const {
+    std::vector<std::vector<Eigen::Vector2d>> raw(shown.points.size());
+    for (std::size_t k = 0; k < raw.size(); ++k) {
+      for (const ConstraintPoint& point : shown.points[k])
+        raw[k].push_back(build.model->state(static_cast<int>(k), point.u, point.v, q).nominal);
+    }
+    for (std::size_t r = 0; r < stress.size(); ++r) {
+      const StrainRow& row = rows.strain[r];
+      if (row.point < 0) continue;
+      raw[static_cast<std::size_t>(row.panel)][static_cast<std::size_t>(row.point)][row.warp ? 1 : 0] =
+          stress[r].nominal;
+    }
+    return raw;
+  }
+
+  Shown show(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd* velocity, double dt) const {
     Shown shown;
     shown.surfaces.reserve(build.panels.size());
     const ShellModel& model = *build.model;
+    for (std::size_t k = 0; k < build.panels.size(); ++k) {
+      shown.points.push_back(system.points[k]);
+      const auto& extra = system.extra_points[k];
+      shown.points[k].insert(shown.points[k].end(), extra.begin(), extra.end());
+    }
+    std::optional<StressField> field;
+    std::vector<std::vector<Eigen::Vector2d>> raw;
+    if (system.strain_rows > 0) {
+      const ConstraintRows& rows = system.projection->rows();
+      const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, dt), q);
+      field.emplace(model, rows, stress);
+      raw = raw_stress(shown, rows, stress, q);
+    }
     for (std::size_t k = 0; k < build.panels.size(); ++k) {
       const int index = static_cast<int>(k);
       const BuiltPanel& built = build.panels[k];
@@ -114,12 +148,20 @@ struct FrameWriter::Impl {
         panel.fields.curvature.push_back(at.curvature);
         panel.fields.second_pk.push_back(at.second_pk);
         panel.fields.nominal.push_back(at.nominal);
+        if (!field) continue;
+        const auto [weft, warp] = field->at(index, uv.x(), uv.y(), q);
+        panel.fields.second_pk.back().head<2>() << weft.second_pk, warp.second_pk;
+        panel.fields.nominal.back() << weft.nominal, warp.nominal;
       }
       if (velocity) panel.velocity = build.net(index, *velocity);
       panel.carries_cloth = built.carries_cloth;
-      panel.points = system.points[k];
-      for (const ConstraintPoint& point : system.points[k]) {
+      panel.points = shown.points[k];
+      for (std::size_t i = 0; i < panel.points.size(); ++i) {
+        const ConstraintPoint& point = panel.points[i];
         panel.point_strain.emplace_back(model.state(index, point.u, point.v, q).strain.head<2>());
+        if (!field) continue;
+        const auto [weft, warp] = field->at(index, point.u, point.v, q);
+        panel.point_stress.emplace_back(weft.nominal, warp.nominal, raw[k][i].x(), raw[k][i].y());
       }
       shown.panels.push_back(std::move(panel));
     }
@@ -153,13 +195,13 @@ void FrameWriter::write(const RunFrame& frame) {
                Flush::no);
   }
   if (impl_->sinks.empty()) return;
-  const Impl::Shown shown = impl_->show(frame.system, frame.q, &frame.velocity);
+  const Impl::Shown shown = impl_->show(frame.system, frame.q, &frame.velocity, frame.dt);
   for (const auto& sink : impl_->sinks) sink->write({frame.number, frame.time, shown.panels});
 }
 
 std::string FrameWriter::preview(const System& system, const Eigen::VectorXd& q) const {
   if (!preview_available()) return {};
-  const Impl::Shown shown = impl_->show(system, q, nullptr);
+  const Impl::Shown shown = impl_->show(system, q, nullptr, 0);
   PreviewOptions options;
   options.up = up(impl_->build.scene);
   options.title = impl_->build.scene.name;

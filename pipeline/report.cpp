@@ -40,7 +40,7 @@ Json panel_json(const BuiltPanel& panel) {
 
 // What studies look at by name. A number that doesn't exist (nothing fell, so nothing can be compared with its work)
 // is left out.
-Json measures_json(const RunResult& run, const StateMeasures& m) {
+Json measures_json(const System& system, const RunResult& run, const StateMeasures& m) {
   Json measures = {{"area", measured(m.area, "m2")},
                    {"mass", measured(m.mass, "kg")},
                    {"lowest", measured(m.lowest, "m")},
@@ -50,6 +50,8 @@ Json measures_json(const RunResult& run, const StateMeasures& m) {
                    {"strain_min", measured(m.strain.min.minCoeff(), "1")},
                    {"strain_p999", measured(m.strain.p999.maxCoeff(), "1")},
                    {"strain_mean_abs", measured(m.strain.mean_abs.mean(), "1")}};
+  const double elastic = run.energy.elastic();
+  if (system.strain_rows > 0 && elastic > 0) measures["hourglass_share"] = measured(m.unseen_energy / elastic, "1");
   const double fall = -run.energy.gravity;
   if (fall > 0) measures["injected_over_gravity_work"] = measured(run.energy.injected / fall, "1");
   for (std::size_t k = 0; k < m.points.size(); ++k) {
@@ -133,14 +135,17 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   }
   report["stress"] = stress(m.nominal);
   report["stress"]["second_pk"] = stress(m.second_pk);
-  report["stress"]["part"] =
-      system.strain_rows > 0 ? "membrane only: what the strain limit carries is not in it" : "whole";
+  if (system.strain_rows > 0) {
+    report["stress"]["raw"] = stress(m.raw_nominal);
+    report["stress"]["raw"]["second_pk"] = stress(m.raw_second_pk);
+  }
   const EnergyBalance& e = run.energy;
   report["energy"] = {{"kinetic", e.kinetic},      {"membrane", e.membrane},       {"bending", e.bending},
                       {"limit", e.limit},          {"gravity", e.gravity},         {"dissipated", e.dissipated()},
                       {"loads_work", e.load_work}, {"motion_work", e.motion_work}, {"injected", e.injected}};
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
                           {"iterations_max", run.iterations_max},
+                          {"gram_nonzeros", system.projection ? system.projection->gram_nonzeros() : 0},
                           {"unconverged_steps", run.unconverged_steps},
                           {"solver", scene.strain_limit.solver == LimitSolver::lagrange ? "lagrange" : "projection"}};
   report["contact"] = {{"max_penetration", 0.0}, {"min_distance", nullptr}};  // nothing touches in this version
@@ -167,7 +172,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   for (const std::string& w : build.warnings) warnings.push_back(w);
   for (const std::string& w : run.warnings) warnings.push_back(w);
   report["warnings"] = warnings;
-  report["measures"] = measures_json(run, m);
+  report["measures"] = measures_json(system, run, m);
   return report;
 }
 

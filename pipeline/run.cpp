@@ -356,7 +356,7 @@ class Loop {
     if (!hooks_.frame) return;
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
-    hooks_.frame({number, result_.state.t, *result_.system, q, v});
+    hooks_.frame({number, result_.state.t, result_.dt_last, *result_.system, q, v});
     result_.frame_seconds += since(start);
     result_.allocations.frames += allocations() - asked;
   }
@@ -366,9 +366,8 @@ class Loop {
     if (!result_.system->projection || row < 0) return "at a pin";
     const StrainRow& strain = result_.system->projection->rows().strain[static_cast<std::size_t>(row)];
     const BuiltPanel& panel = build_.panels[static_cast<std::size_t>(strain.panel)];
-    const ConstraintPoint& point = panel.strain_point(strain.point);
-    return fmt::format("in {} at (u, v) = ({:.6g}, {:.6g}) of panel '{}'", strain.warp ? "warp" : "weft", point.u,
-                       point.v, panel.name);
+    return fmt::format("in {} at (u, v) = ({:.6g}, {:.6g}) of panel '{}'", strain.warp ? "warp" : "weft", strain.uv.x(),
+                       strain.uv.y(), panel.name);
   }
 
   void fail(const std::string& what) {

@@ -21,6 +21,7 @@ const char* name(RunExit exit);  // "ok", "solver", "check", "interrupted", "tim
 struct RunFrame {
   int number = 0;
   double time = 0;
+  double dt = 0;  // s, of the last step; 0 before the first
   const System& system;
   const Eigen::VectorXd& q;         // 3 n [m]
   const Eigen::VectorXd& velocity;  // 3 n [m/s]

@@ -464,7 +464,9 @@ void read_limit(Table table, Scene& scene) {
           key,
           fmt::format("{} belongs to solver = \"projection\"; \"lagrange\" holds the limit as hard equalities", key));
   }
-  table.choice("points", {"knot-mesh"}, {"gauss-2x2", "gauss-1", "cell-average", "greville"});
+  std::vector<std::string> rules;
+  for (const NamedRule& rule : point_rules()) rules.emplace_back(rule.name);
+  if (const auto points = table.choice("points", rules, {})) limit.points = *point_rule(*points);
   table.number(limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
   if (const auto n = table.integer("max_iterations", 1, 10000)) limit.max_iterations = *n;
   table.done();

@@ -11,6 +11,7 @@
 
 #include "analysis/fabric/fabric.h"
 #include "analysis/projection/fast_projection.h"
+#include "analysis/projection/point_rule.h"
 #include "pipeline/addresses.h"
 
 namespace toile {
@@ -93,6 +94,7 @@ struct StrainLimit {
   StrainBand weft = {}, warp = {};  // "inextensible": both tolerance, without slack
   bool stretched = false;           // whether a band limits stretch
   std::optional<double> stiffness;  // N/m of force per strain before the wall; unset: chosen by the loads
+  PointRule points = PointRule::greville_derivative;  // at p = 2 the knot mesh
   LimitSolver solver = LimitSolver::projection;
   ProjectionVariant variant = ProjectionVariant::second_order;  // of the projection
   double regularisation = 1e-3;                                 // the default of ProjectionOptions

@@ -39,12 +39,6 @@ ScalarRow row_at(const Build& build, int panel, const Eigen::Vector2d& uv) {
   return row;
 }
 
-Eigen::Vector3d apply(const ScalarRow& row, const Eigen::VectorXd& q) {
-  Eigen::Vector3d y = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * q.segment<3>(3 * row.index[k]);
-  return y;
-}
-
 // What is held on one side of a seam is held on the other.
 std::vector<int> on_both_sides(const std::vector<int>& control_points, const std::vector<int>& leader) {
   std::vector<bool> held(leader.size(), false);
@@ -241,20 +235,6 @@ double default_limit_stiffness(const Build& build, int panel) {
   return reserve * std::max({load / narrowest, own, shell.fabric.density});
 }
 
-// Masses of control points as strain rows weigh them: on closed panels what moves together counts together, so that a
-// seam is as stiff as any other line.
-Eigen::VectorXd row_masses(const Build& build) {
-  Eigen::VectorXd mass = build.model->lumped_mass();
-  const Eigen::VectorXd shared = build.dependence * (build.dependence.transpose() * mass);
-  for (std::size_t k = 0; k < build.panels.size(); ++k) {
-    if (!build.panels[k].closure.any()) continue;
-    const int first = build.model->first_control_point(static_cast<int>(k));
-    const Eigen::Index count = build.rest(static_cast<int>(k)).points().cols();
-    mass.segment(first, count) = shared.segment(first, count);
-  }
-  return mass;
-}
-
 std::unique_ptr<System> assemble(const Build& build, double t) {
   const Scene& scene = build.scene;
   auto system = std::make_unique<System>();
@@ -367,8 +347,10 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
   }
   const StrainLimit& limit = scene.strain_limit;
   if (limit.on) {
-    const Eigen::VectorXd mass = row_masses(build).cwiseMax(build.mass_floor);
-    rows.strain = select_rows(*build.model, *system->map, mass, system->points, rows.place);
+    std::vector<StrainRow> means;
+    for (const BuiltPanel& panel : build.panels)
+      means.insert(means.end(), panel.mean_rows.begin(), panel.mean_rows.end());
+    rows.strain = select_rows(*build.model, *system->map, system->points, rows.place, means);
     if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::second_order) {
       std::vector<double> stiffness, rate;
       for (std::size_t k = 0; k < build.panels.size(); ++k) {
@@ -384,7 +366,11 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
       }
     }
   }
-  for (std::size_t k = 0; k < build.panels.size(); ++k) system->points[k].resize(build.panels[k].points.size());
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const auto listed = static_cast<std::ptrdiff_t>(build.panels[k].points.size());
+    system->extra_points.emplace_back(system->points[k].begin() + listed, system->points[k].end());
+    system->points[k].resize(static_cast<std::size_t>(listed));
+  }
   system->strain_rows = static_cast<int>(rows.strain.size());
   system->place_rows = static_cast<int>(rows.place.size());
   if (!rows.strain.empty() || !rows.place.empty()) {

@@ -16,9 +16,11 @@ struct System {
   System() = default;
   System(const System&) = delete;
 
-  std::vector<int> fixed_pin;                        // pin of each fixed control point, in map order
-  std::vector<std::vector<ConstraintPoint>> points;  // per panel: which the projection takes, and why not
-  std::vector<std::string> warnings;                 // pins that hold what others hold
+  std::vector<int> fixed_pin;  // pin of each fixed control point, in map order
+  // Per panel: which the projection takes, and why not. Those that the panel lists, and those of the sampling rule and
+  // of pins besides; a StrainRow's `point` counts through the first, then the second.
+  std::vector<std::vector<ConstraintPoint>> points, extra_points;
+  std::vector<std::string> warnings;  // pins that hold what others hold
   int strain_rows = 0, place_rows = 0;
   std::vector<int> place_pin;  // pin of each place row
   std::unique_ptr<AffineMap> map;

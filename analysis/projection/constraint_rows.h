@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/affine_map.h"
 #include "analysis/shell/shell_model.h"
 #include "trimming/constraint_points.h"
 
@@ -21,11 +22,13 @@ struct ScalarRow {
 struct StrainRow {
   ScalarRow row;
   int panel = 0;
-  int point = 0;  // in the panel's constraint points
+  int point = 0;  // in the panel's constraint points; -1: the row is a mean, of no point
   bool warp = false;
-  double area = 0;          // m2, of the cloth that the row speaks for: sum of N_I mass_I over the density
-  double stiffness = 0;     // N m, force per strain times area; 0: hard
-  double damping_rate = 0;  // 1/s, with a stiffness: see FastProjection::step
+  double area = 0;               // m2, of the cloth that the row speaks for
+  double stiffness = 0;          // N m, force per strain times area; 0: hard
+  double damping_rate = 0;       // 1/s, with a stiffness: see FastProjection::step
+  Eigen::Vector2d uv{0, 0};      // where it stands on the panel
+  Eigen::Vector2d thread{1, 0};  // unit, in weft and warp: the direction whose strain C is; `warp` says the nearer
 };
 struct PlaceRow {
   ScalarRow row;
@@ -39,10 +42,13 @@ struct ConstraintRows {
 };
 
 // Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points()
-// gives them; `mass` of all control points [kg]. Functions that vanish at a point (all but p per direction on a C1 knot
-// line) are left out. Rows are hard.
-std::vector<StrainRow> strain_rows(const ShellModel& model, const std::vector<std::vector<ConstraintPoint>>& points,
-                                   const Eigen::VectorXd& mass);
+// gives them. Functions that vanish at a point (all but p per direction on a C1 knot line) are left out. Rows are hard;
+// their areas are those of weigh_rows().
+std::vector<StrainRow> strain_rows(const ShellModel& model, const AffineMap& map,
+                                   const std::vector<std::vector<ConstraintPoint>>& points);
+
+// y = sum d_I q_I.
+Eigen::Vector3d apply(const ScalarRow& row, const Eigen::Ref<const Eigen::VectorXd>& q);
 
 // The row of one material point's place, for pins.
 ScalarRow place_row(const ShellModel& model, int panel, double u, double v);

@@ -66,6 +66,7 @@ class ConstraintSolver {
 
   virtual const ConstraintRows& rows() const = 0;
   virtual std::size_t factor_nonzeros() const = 0;
+  virtual std::size_t gram_nonzeros() const { return 0; }  // of the whole J M^-1 J^T; 0 where it isn't formed
 };
 
 }  // namespace toile

@@ -417,6 +417,9 @@ const ConstraintRows& FastProjection::rows() const {
 const ProjectionOptions& FastProjection::options() const {
   return impl_->options;
 }
+std::size_t FastProjection::gram_nonzeros() const {
+  return 2 * impl_->pattern.row.size() - static_cast<std::size_t>(impl_->size());  // the pattern is the lower triangle
+}
 std::size_t FastProjection::factor_nonzeros() const {
   return impl_->factor ? impl_->factor->factor_nonzeros() : 0;
 }

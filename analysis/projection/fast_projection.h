@@ -74,6 +74,7 @@ class FastProjection final : public ConstraintSolver {
   const ConstraintRows& rows() const override;
   const ProjectionOptions& options() const;
   std::size_t factor_nonzeros() const override;
+  std::size_t gram_nonzeros() const override;
 
  private:
   struct Impl;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace toile {
 namespace {
@@ -37,46 +38,125 @@ std::vector<double> border_lines(const KnotVector& knots, bool closed) {
   return lines;
 }
 
-std::vector<double> middles(const KnotVector& knots) {
+// `count` Gauss points of every span.
+std::vector<double> gauss_lines(const KnotVector& knots, int count) {
   const std::vector<double> breaks = knots.breaks();
+  const double offset = count == 2 ? std::numbers::inv_sqrt3 / 2 : 0;
   std::vector<double> lines;
-  for (std::size_t c = 0; c + 1 < breaks.size(); ++c) lines.push_back(0.5 * (breaks[c] + breaks[c + 1]));
+  for (std::size_t c = 0; c + 1 < breaks.size(); ++c)
+    for (int k = 0; k < count; ++k)
+      lines.push_back(breaks[c] + (0.5 + (2 * k - 1) * offset) * (breaks[c + 1] - breaks[c]));
   return lines;
 }
 
-struct Line {
-  double at = 0;
-  bool knot = false;
-};
-std::vector<Line> merged(const std::vector<double>& breaks, const std::vector<double>& extra) {
-  std::vector<Line> lines;
-  for (const double u : breaks) lines.push_back({u, true});
-  for (const double u : extra) lines.push_back({u, false});
-  std::ranges::sort(lines, {}, &Line::at);
+// Greville abscissae of the splines of degree p - `lower`. Where two meet, each for one side of a C0 line or of a seam,
+// the earlier one is moved half of its way back.
+std::vector<double> greville_lines(const KnotVector& knots, int lower, bool closed) {
+  const Interval domain = knots.domain();
+  std::vector<double> lines;
+  for (int i = lower; i < knots.control_point_count(); ++i) {
+    double u = 0;
+    for (int k = 1; k <= knots.degree() - lower; ++k) u += knots[i + k];
+    lines.push_back(std::clamp(u / (knots.degree() - lower), domain.min, domain.max));
+  }
+  if (closed) lines.push_back(domain.max);
+  for (std::size_t k = 1; k + 1 < lines.size(); ++k)
+    if (lines[k] == lines[k + 1]) lines[k] = 0.5 * (lines[k - 1] + lines[k]);
   return lines;
 }
+
+// Lines that are knot lines but for rounding become so.
+void snap(std::vector<double>& lines, const std::vector<double>& breaks) {
+  constexpr double rounding = 1e-9;  // of a span
+  for (double& u : lines) {
+    const auto above = std::upper_bound(breaks.begin() + 1, breaks.end() - 1, u);
+    const double width = *above - *(above - 1);
+    for (const double knot : {*(above - 1), *above})
+      if (std::abs(u - knot) <= rounding * width) u = knot;
+  }
+}
+
+// The lines of a rule besides the knot lines.
+std::vector<double> lines_of(PointRule rule, const KnotVector& knots, bool closed) {
+  switch (rule) {
+    case PointRule::border:
+      return border_lines(knots, closed);
+    case PointRule::greville:
+      return greville_lines(knots, 0, closed);
+    case PointRule::greville_derivative:
+      return greville_lines(knots, 1, closed);
+    case PointRule::gauss_2x2:
+      return gauss_lines(knots, 2);
+    case PointRule::mid_span:
+    case PointRule::half_span:
+    case PointRule::gauss_1:
+      return gauss_lines(knots, 1);
+    case PointRule::knot_mesh:
+    case PointRule::cell_average:
+    case PointRule::springs_quad:
+    case PointRule::springs_triangle:
+      break;
+  }
+  return {};
+}
+
+constexpr NamedRule rules[] = {{"knot-mesh", PointRule::knot_mesh},
+                               {"border", PointRule::border},
+                               {"mid-span", PointRule::mid_span},
+                               {"half-span", PointRule::half_span},
+                               {"greville", PointRule::greville},
+                               {"greville-derivative", PointRule::greville_derivative},
+                               {"gauss-1", PointRule::gauss_1},
+                               {"gauss-2x2", PointRule::gauss_2x2},
+                               {"cell-average", PointRule::cell_average},
+                               {"springs-quad", PointRule::springs_quad},
+                               {"springs-triangle", PointRule::springs_triangle}};
 
 }  // namespace
 
-std::vector<ConstraintPoint> points_for_degree(const TrimmedSurface& surface, const TrimTopology& topology,
-                                               PointRule rule, const Closure& closure) {
-  const KnotVector& u = surface.surface.u();
-  const KnotVector& v = surface.surface.v();
-  std::vector<ConstraintPoint> points;
-  if (rule == PointRule::knot_mesh) return points;
-  const auto extra = [&](const KnotVector& knots, bool closed) {
-    return rule == PointRule::border ? border_lines(knots, closed) : middles(knots);
+std::span<const NamedRule> point_rules() {
+  return rules;
+}
+
+std::optional<PointRule> point_rule(std::string_view name) {
+  const auto* found = std::ranges::find(rules, name, &NamedRule::name);
+  return found == std::end(rules) ? std::nullopt : std::optional(found->rule);
+}
+
+std::vector<ConstraintPoint> apply_rule(PointRule rule, const TrimmedSurface& surface, const TrimTopology& topology,
+                                        std::vector<ConstraintPoint>& listed, const Closure& closure) {
+  const KnotMesh& mesh = topology.mesh;
+  const bool knot_mesh = rule == PointRule::knot_mesh || rule == PointRule::border || rule == PointRule::mid_span ||
+                         rule == PointRule::half_span;
+  const bool knot_lines = rule == PointRule::border || rule == PointRule::half_span;
+  const auto lines = [&](Direction d, const std::vector<double>& breaks) {
+    std::vector<double> all = lines_of(rule, surface.surface.knots(d), closure.in(d));
+    snap(all, breaks);
+    if (knot_lines) all.insert(all.end(), breaks.begin(), breaks.end());
+    std::ranges::sort(all);
+    return all;
   };
-  const std::vector<Line> lines_u = merged(topology.mesh.u, extra(u, closure.u)),
-                          lines_v = merged(topology.mesh.v, extra(v, closure.v));
-  for (const Line& b : lines_v)
-    for (const Line& a : lines_u) {
-      if (a.knot && b.knot) continue;
-      if (rule == PointRule::cells && (a.knot || b.knot)) continue;
-      if (!contains(surface, topology, {a.at, b.at})) continue;
+  const std::vector<double> lines_u = lines(Direction::u, mesh.u), lines_v = lines(Direction::v, mesh.v);
+  const auto among = [](const std::vector<double>& sorted, double u) { return std::ranges::binary_search(sorted, u); };
+  const auto vertex = [&](double u, double v) { return among(mesh.u, u) && among(mesh.v, v); };
+  const auto on_domain_border = [&](const ConstraintPoint& p) {
+    return p.u == mesh.u.front() || p.u == mesh.u.back() || p.v == mesh.v.front() || p.v == mesh.v.back();
+  };
+  for (ConstraintPoint& point : listed) {
+    const bool of_trim = point.kind != PointKind::vertex && !(vertex(point.u, point.v) && on_domain_border(point));
+    if (knot_mesh || (among(lines_u, point.u) && among(lines_v, point.v)) ||
+        (of_trim && rule == PointRule::greville_derivative))
+      continue;
+    point.used = false;
+    point.why = "rule";
+  }
+  std::vector<ConstraintPoint> points;
+  for (const double v : lines_v)
+    for (const double u : lines_u) {
+      if (vertex(u, v) || !contains(surface, topology, {u, v})) continue;
       ConstraintPoint point;
-      point.u = a.at;
-      point.v = b.at;
+      point.u = u;
+      point.v = v;
       points.push_back(point);
     }
   return points;

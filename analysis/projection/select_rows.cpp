@@ -97,25 +97,26 @@ void merge_near_points(const NurbsSurface& surface, std::vector<ConstraintPoint>
     }
 }
 
-std::vector<StrainRow> select_rows(const ShellModel& model, const AffineMap& map, const Eigen::VectorXd& mass,
+std::vector<StrainRow> select_rows(const ShellModel& model, const AffineMap& map,
                                    std::vector<std::vector<ConstraintPoint>>& points,
-                                   const std::vector<PlaceRow>& place) {
+                                   const std::vector<PlaceRow>& place, const std::vector<StrainRow>& means) {
   check_places(map, place);
   for (std::size_t panel = 0; panel < points.size(); ++panel)
     merge_near_points(model.panels()[panel].rest, points[panel]);
 
-  const std::vector<StrainRow> all = strain_rows(model, points, mass);
+  std::vector<StrainRow> all = strain_rows(model, map, points);
+  all.insert(all.end(), means.begin(), means.end());
   const ComposedRows composed = compose(map, {all, {}});
   const auto moves = [&](std::size_t r) { return composed.free.start[r] < composed.free.start[r + 1]; };
   std::vector<StrainRow> out;
-  for (std::size_t r = 0; r < all.size(); r += 2) {  // weft and warp of one point
-    ConstraintPoint& point = points[all[r].panel][all[r].point];
-    if (!moves(r) && !moves(r + 1)) {
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    const bool first_of_point = all[r].point >= 0 && !all[r].warp;
+    if (first_of_point && !moves(r) && !moves(r + 1)) {
+      ConstraintPoint& point = points[all[r].panel][all[r].point];
       point.used = false;
       point.why = "fixed";
     }
-    for (std::size_t k : {r, r + 1})
-      if (moves(k)) out.push_back(all[k]);
+    if (moves(r)) out.push_back(all[r]);
   }
   return out;
 }

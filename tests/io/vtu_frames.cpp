@@ -210,6 +210,8 @@ TEST(Vtu, NetTrimsAndPointsSayWhatTheyAre) {
   EXPECT_EQ(points["used"], (std::vector<double>{1, 0}));
   EXPECT_EQ(points["kind"], (std::vector<double>{double(PointKind::vertex), double(PointKind::crossing_v)}));
   EXPECT_EQ(points["strain_warp"], (std::vector<double>{0.002f, -0.001f}));
+  EXPECT_EQ(points["nominal_stress_warp"], (std::vector<double>{2, -2}));
+  EXPECT_EQ(points["raw_nominal_stress_weft"], (std::vector<double>{3, -3}));
 }
 
 TEST(Vtu, SameFrameSameBytes) {

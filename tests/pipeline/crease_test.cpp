@@ -92,7 +92,8 @@ TEST(Degree, CubicPanelsTakeMorePointsThanTheyList) {
   const Build b = built(folder, face, test::scene_text(corner_pins));
   EXPECT_EQ(b.rest(0).u().degree(), 3);
   EXPECT_EQ(b.panels[0].points.size(), 36u);        // the knot vertices: what inspect lists
-  EXPECT_EQ(b.panels[0].extra_points.size(), 28u);  // 8 x 8 lines in all
+  EXPECT_EQ(b.panels[0].extra_points.size(), 45u);  // 7 x 7 lines in all, which meet the listed points at the corners
+  EXPECT_EQ(std::ranges::count(b.panels[0].points, true, &ConstraintPoint::used), 4);
   const RunResult result = run(b);
   EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
   EXPECT_EQ(result.system->points[0].size(), 36u);

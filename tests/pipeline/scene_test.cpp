@@ -165,9 +165,16 @@ TEST(Scene, TheLagrangeNewtonTakesHardLimitsOnly) {
             std::string::npos);
 }
 
+TEST(Scene, EverySamplingRuleIsKnownByItsName) {
+  for (const NamedRule& rule : point_rules()) {
+    const Scene scene = parse(valid_lines(), {"strain_limit.points=" + std::string(rule.name)});
+    EXPECT_EQ(scene.strain_limit.points, rule.rule) << rule.name;
+  }
+  expect_message(11, "points = \"grevile\"", {"unknown points", "greville"});
+}
+
 TEST(Scene, LaterFeaturesAreRefusedByName) {
   expect_message(11, "solver = \"springs\"", {"not supported by this version", "projection", "lagrange"});
-  expect_message(11, "points = \"greville\"", {"not supported by this version", "knot-mesh"});
   expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});
   expect_message(15, "scheme = \"newmark\"", {"not supported by this version", "verlet"});
   expect_message(12, "[[contact_pair]]", {"[[contact_pair]] is not supported by this version"});

@@ -68,6 +68,7 @@ struct Draped {
     panel.carries_cloth.back() = false;
     panel.points = points;
     panel.point_strain = {{0.01, 0.002}, {0.003, -0.001}};
+    panel.point_stress = {{1, 2, 3, 4}, {-1, -2, -3, -4}};
   }
   Frame frame(int number = 0, double time = 0) const { return {number, time, {&panel, 1}}; }
 };

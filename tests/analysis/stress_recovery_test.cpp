@@ -1,0 +1,133 @@
+#include "analysis/projection/stress_recovery.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/projection/point_rule.h"
+#include "analysis/projection/select_rows.h"
+#include "support/near.h"
+#include "support/panels.h"
+
+namespace toile {
+namespace {
+
+TrimmedSurface square(int degree, int spans) {
+  TrimmedSurface face;
+  face.surface = test::flat_surface(1, 1, uniform_knots(degree, spans), uniform_knots(degree, spans));
+  face.loops = {natural_loop(face.surface)};
+  face.natural_bounds = true;
+  return face;
+}
+
+struct Limited {
+  ShellModel model;
+  ConstraintRows rows;
+};
+Limited limited(const TrimmedSurface& face, PointRule rule = PointRule::greville_derivative) {
+  const TrimTopology topology = trace_trims(face);
+  std::vector<ShellPanel> panels{test::make_panel(face.surface)};
+  panels[0].quadrature = quadrature(face, topology);
+  ShellModel model(std::move(panels));
+  std::vector<std::vector<ConstraintPoint>> points{constraint_points(face, topology)};
+  const std::vector<ConstraintPoint> extra = apply_rule(rule, face, topology, points[0]);
+  points[0].insert(points[0].end(), extra.begin(), extra.end());
+  const AffineMap map(AffineMap::identity(model.control_point_count()), {}, nullptr);
+  std::vector<StrainRow> rows = select_rows(model, map, points, {});
+  return {std::move(model), {std::move(rows), {}}};
+}
+
+// Largest part of a uniform stress's force on a control point, over the largest force, that the rows' areas leave over.
+double unbalanced(const Limited& l, bool warp) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(l.model.control_point_count()), whole = sum;
+  for (const StrainRow& row : l.rows.strain)
+    for (std::size_t k = 0; row.warp == warp && k < row.row.index.size(); ++k)
+      sum[row.row.index[k]] += row.area * row.row.value[k];
+  const ShellPanel& panel = l.model.panels()[0];
+  for (std::size_t p = 0; p < panel.quadrature.points.size(); ++p) {
+    const Eigen::Vector2d& uv = panel.quadrature.points[p];
+    const MaterialPoint point = l.model.material_point(0, uv.x(), uv.y());
+    for (std::size_t k = 0; k < point.index.size(); ++k)
+      whole[point.index[k]] += panel.quadrature.weights[p] * point.value[warp ? 2 : 1][k];
+  }
+  return (sum - whole).cwiseAbs().maxCoeff() / whole.cwiseAbs().maxCoeff();
+}
+
+TEST(RowAreas, AUniformStressIsInEquilibrium) {
+  for (const int degree : {2, 3, 4, 5}) {
+    // As many lines as Simpson's rule takes: an odd number.
+    const int spans = degree % 2 == 0 ? 8 : 7;
+    const Limited l = limited(square(degree, spans));
+    for (const bool warp : {false, true}) EXPECT_LT(unbalanced(l, warp), 1e-3) << degree;
+    double area = 0;
+    for (const StrainRow& row : l.rows.strain) area += row.warp ? 0 : row.area;
+    expect_near_rel(area, 1, 1e-3);
+  }
+}
+
+TEST(RowAreas, TrapezoidAlongTheThreadsAndSimpsonAcross) {
+  const Limited l = limited(square(2, 8));
+  for (const StrainRow& row : l.rows.strain) {
+    const double along = row.warp ? row.uv.y() : row.uv.x(), across = row.warp ? row.uv.x() : row.uv.y();
+    const int line = int(std::lround(8 * across));
+    const bool ends_along = along == 0 || along == 1, ends_across = line == 0 || line == 8;
+    const double expected = (ends_along ? 0.5 : 1) * (ends_across ? 1.0 / 3 : line % 2 ? 4.0 / 3 : 2.0 / 3) / 64;
+    expect_near_rel(row.area, expected, 2e-3);
+  }
+}
+
+// The multipliers that hard rows have in a cloth under one uniform stress: Simpson's weights across the pull, which
+// the paper's nodal areas turn into stripes of 2/3 and 4/3.
+TEST(StressRecovery, TheStripesOfTheMultipliersAreGone) {
+  const Limited l = limited(square(2, 8));
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(l.rows.strain.size());
+  double least = 1, most = 0;
+  for (std::size_t r = 0; r < l.rows.strain.size(); ++r) {
+    const StrainRow& row = l.rows.strain[r];
+    if (!row.warp) continue;
+    const int i = int(std::lround(8 * row.uv.x())), j = int(std::lround(8 * row.uv.y()));
+    const double across = i % 8 == 0 ? 1.0 / 3 : i % 2 ? 4.0 / 3 : 2.0 / 3, along = j % 8 == 0 ? 0.5 : 1;
+    force[Eigen::Index(r)] = across * along / 64;
+    if (i % 8 == 0 || j % 8 == 0) continue;
+    least = std::min(least, force[Eigen::Index(r)] * 64);
+    most = std::max(most, force[Eigen::Index(r)] * 64);
+  }
+  EXPECT_LT(least, 0.7);  // over a cell's area
+  EXPECT_GT(most, 1.3);
+  const Eigen::VectorXd& rest = l.model.rest();
+  const std::vector<ThreadStress> raw = row_stress(l.model, l.rows, force, rest);
+  for (std::size_t r = 0; r < raw.size(); ++r) EXPECT_NEAR(raw[r].nominal, l.rows.strain[r].warp ? 1 : 0, 2e-3);
+  const StressField smooth(l.model, l.rows, raw);
+  for (const double u : {0.0, 0.03, 0.31, 0.5, 0.77, 1.0})
+    for (const double v : {0.0, 0.12, 0.5, 0.93, 1.0}) {
+      const auto [weft, warp] = smooth.at(0, u, v, rest);
+      EXPECT_NEAR(warp.nominal, 1, 2e-3);
+      EXPECT_NEAR(warp.second_pk, 1, 2e-3);
+      EXPECT_NEAR(weft.nominal, 0, 1e-12);
+    }
+}
+
+TEST(StressRecovery, TheFabricsPartIsInIt) {
+  const Limited l = limited(square(3, 5));
+  Eigen::VectorXd q = l.model.rest();
+  for (int k = 0; k < q.size(); k += 3) q[k] *= 1.1;
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(l.rows.strain.size());
+  const StressField field(l.model, l.rows, row_stress(l.model, l.rows, none, q));
+  const double S = l.model.panels()[0].fabric.membrane.weft * 0.5 * (1.1 * 1.1 - 1);
+  const auto [weft, warp] = field.at(0, 0.4, 0.7, q);
+  expect_near_rel(weft.second_pk, S, 1e-12);
+  expect_near_rel(weft.nominal, 1.1 * S, 1e-12);
+  EXPECT_NEAR(warp.nominal, 0, 1e-12);
+}
+
+TEST(StressRecovery, WithoutRowsItIsTheFabrics) {
+  const Limited l = limited(square(2, 4));
+  const StressField field(l.model, {}, {});
+  Eigen::VectorXd q = l.model.rest();
+  for (int k = 1; k < q.size(); k += 3) q[k] *= 0.9;
+  EXPECT_EQ(field.at(0, 0.4, 0.7, q)[1].nominal, l.model.state(0, 0.4, 0.7, q).nominal[1]);
+}
+
+}  // namespace
+}  // namespace toile
