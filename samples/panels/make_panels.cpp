@@ -193,10 +193,19 @@ TrimmedSurface collapsed_square() {
   return untrimmed(square.with_points(points));
 }
 
+// A unit square raised to a parabola in u, `height` in the middle.
+TrimmedSurface arched_square(double height) {
+  const NurbsSurface plain = flat({0, 1}, {0, 1}, 2, 1, 1);
+  Eigen::Matrix3Xd points = plain.points();
+  for (int j = 0; j < 3; ++j) points(2, plain.index(1, j)) = 2 * height;
+  return untrimmed(plain.with_points(std::move(points)));
+}
+
 void write_study_panels(const std::filesystem::path& out) {
   write(out / "studies/cantilever/strip.igs", untrimmed(flat({0, 0.2}, {0, 0.02}, 1, 1, 1)), "strip", 1, "M");
   write(out / "studies/disc/trimmed.igs", trimmed_disc(0.7), "disc", 1, "M");
   write(out / "studies/disc/fitted.igs", fitted_disc(), "disc", 1, "M");
+  write(out / "studies/rules/arch.igs", arched_square(0.1), "cloth", 1, "M");
   const std::filesystem::path stability = out / "stability/panels";
   for (int k = 1; k <= 4; ++k) {
     write(stability / ("aspect_1e" + std::to_string(k) + ".igs"),
