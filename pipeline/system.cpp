@@ -335,7 +335,8 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     Candidate& c = candidates[k];
     const Eigen::Vector3d from = apply(c.row, build.start);
-    if (!taken[k] && c.required) system->warnings.push_back(held_twice(scene, candidates, taken, k, build.start));
+    const bool point = scene.pins[static_cast<std::size_t>(c.pin)].at.kind == Address::Kind::uv;
+    if (!taken[k] && point) system->warnings.push_back(held_twice(scene, candidates, taken, k, build.start));
     if (!taken[k]) continue;
     const int pin = c.pin;
     rows.place.push_back({c.row, pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
