@@ -194,7 +194,9 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
                     result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
     console.warning(result.warnings.back());
   }
-  const StateMeasures measures = measure(built, *result.system, result.state, result.dt_last);
+  // The forces of a refused step are not those of the state that it started from.
+  const double forces_of = result.exit == RunExit::solver_failed ? 0 : result.dt_last;
+  const StateMeasures measures = measure(built, *result.system, result.state, forces_of);
   const std::string report = json_text(report_json(built, result, measures, since(writing))) + "\n";
   write_file(directory / "report.json", report);
   log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit),
@@ -206,7 +208,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
                            built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,
                            result.wall_seconds));
   if (built.scene.rest && result.exit == RunExit::ok) {
-    console.note(fmt::format("  at rest after {} steps: let go for half of them, no point swings by more than {:.2g} m",
+    console.note(fmt::format("  at rest after {} steps: let go, no point swings by more than {:.2g} m",
                              result.relaxation.steps, result.relaxation.remaining));
   }
   console.note(

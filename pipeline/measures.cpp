@@ -68,7 +68,7 @@ void measure_rows(const ConstraintRows& rows, const std::vector<ThreadStress>& s
 }
 
 // Energy of the fabric's weft and warp strain over the cloth less that of the strains that the rows see: what hourglass
-// modes hold.
+// modes hold. Negative where the rows count more than there is.
 double unseen_energy(const Build& build, const System& system, const Eigen::VectorXd& q) {
   const ShellModel& model = *build.model;
   double energy = 0;
@@ -88,16 +88,19 @@ double unseen_energy(const Build& build, const System& system, const Eigen::Vect
                  c = 0.5 * (apply(row.row, q).squaredNorm() - 1);
     energy -= 0.5 * k * row.area * c * c;
   }
-  return std::max(energy, 0.0);
+  return energy;
 }
 
 }  // namespace
 
-Eigen::VectorXd row_forces(const System& system, double dt) {
-  const Eigen::VectorXd& multipliers = system.projection->strain_multipliers();
-  Eigen::VectorXd forces = Eigen::VectorXd::Zero(multipliers.size());
-  for (Eigen::Index r = 0; dt > 0 && r < forces.size(); ++r)
-    forces[r] = std::copysign(system.projection->strain_impulses().col(r).norm(), multipliers[r]) / (dt * dt);
+Eigen::VectorXd row_forces(const System& system, const Eigen::VectorXd& q, double dt) {
+  const std::vector<StrainRow>& rows = system.projection->rows().strain;
+  Eigen::VectorXd forces = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.size()));
+  for (Eigen::Index r = 0; dt > 0 && r < forces.size(); ++r) {
+    const Eigen::Vector3d impulse = system.projection->strain_impulses().col(r);
+    const Eigen::Vector3d tangent = apply(rows[static_cast<std::size_t>(r)].row, q);
+    forces[r] = std::copysign(impulse.norm(), impulse.dot(tangent)) / (dt * dt);
+  }
   return forces;
 }
 
@@ -134,7 +137,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   std::optional<StressField> field;
   if (system.strain_rows > 0) {
     const ConstraintRows& rows = system.projection->rows();
-    const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, dt), q);
+    const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, q, dt), q);
     field.emplace(model, rows, stress);
     measure_rows(rows, stress, m);
     m.unseen_energy = unseen_energy(build, system, q);

@@ -39,7 +39,7 @@ struct StateMeasures {
 StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt);
 
 // Force [N m] of each strain row in the last step, for row_stress().
-Eigen::VectorXd row_forces(const System& system, double dt);
+Eigen::VectorXd row_forces(const System& system, const Eigen::VectorXd& q, double dt);
 
 // Unit vector against gravity; z where there is none.
 Eigen::Vector3d up(const Scene& scene);

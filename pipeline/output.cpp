@@ -129,7 +129,7 @@ struct FrameWriter::Impl {
     std::vector<std::vector<Eigen::Vector2d>> raw;
     if (system.strain_rows > 0) {
       const ConstraintRows& rows = system.projection->rows();
-      const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, dt), q);
+      const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, q, dt), q);
       field.emplace(model, rows, stress);
       raw = raw_stress(shown, rows, stress, q);
     }

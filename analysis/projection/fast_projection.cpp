@@ -185,7 +185,7 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
       residual[r] = slack[r] ? 0 : C - law(r).strain(lambda);
       report.residual = std::max(report.residual, std::abs(residual[r]) / std::min(b.stretch, b.compress));
     }
-    if (!(violation <= report.strain_violation)) {  // NaN counts as worst
+    if (!(violation <= report.strain_violation) && !std::isnan(report.strain_violation)) {  // NaN counts as worst
       report.strain_violation = violation;
       report.worst_row = r;
     }
@@ -193,7 +193,8 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
   for (int p = 0; p < places(); ++p) {
     const Eigen::Vector3d gap = y.col(strains() + p) - targets.col(p);
     residual.segment<3>(strains() + 3 * p) = gap;
-    if (!(gap.norm() <= report.place_violation)) report.place_violation = gap.norm();
+    if (!(gap.norm() <= report.place_violation) && !std::isnan(report.place_violation))
+      report.place_violation = gap.norm();
   }
   report.converged = report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
 }

@@ -153,13 +153,15 @@ void LagrangeNewton::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
   report.worst_row = -1;
   for (int r = 0; r < strains(); ++r) {
     strain[r] = gram_diagonal[r] > 0 ? 0.5 * (y.col(r).squaredNorm() - 1) : 0;
-    if (strain[r] == 0 || std::abs(strain[r]) <= report.strain_violation) continue;  // NaN counts as worst
+    if (strain[r] == 0 || std::abs(strain[r]) <= report.strain_violation || std::isnan(report.strain_violation))
+      continue;  // NaN counts as worst
     report.strain_violation = std::abs(strain[r]);
     report.worst_row = r;
   }
   gap = y.rightCols(places()) - targets;
   for (int p = 0; p < places(); ++p)
-    if (!(gap.col(p).norm() <= report.place_violation)) report.place_violation = gap.col(p).norm();
+    if (!(gap.col(p).norm() <= report.place_violation) && !std::isnan(report.place_violation))
+      report.place_violation = gap.col(p).norm();
   report.converged = report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
 }
 
@@ -179,7 +181,7 @@ void LagrangeNewton::Impl::balance(const Eigen::Ref<const Eigen::VectorXd>& x, P
   for (int r = 0; r < strains(); ++r) spread(r, lambda()[r] * y.col(r), force);
   for (int p = 0; p < places(); ++p) spread(strains() + p, memory.place_multipliers.col(p), force);
   const double left = size_of_force();
-  report.residual = left > smallest_move ? left / std::max(moved, smallest_move) : 0;
+  report.residual = left <= smallest_move ? 0 : left / std::max(moved, smallest_move);
   const double first = std::max(first_strain, least_strain * options.tolerance);
   if (strains() > 0) report.residual = std::max(report.residual, missed.cwiseAbs().maxCoeff() / first);
 }

@@ -49,6 +49,17 @@ std::vector<double> gauss_lines(const KnotVector& knots, int count) {
   return lines;
 }
 
+// Lines that are knot lines but for rounding become so.
+void snap(std::vector<double>& lines, const std::vector<double>& breaks) {
+  constexpr double rounding = 1e-9;  // of a span
+  for (double& u : lines) {
+    const auto above = std::upper_bound(breaks.begin() + 1, breaks.end() - 1, u);
+    const double width = *above - *(above - 1);
+    for (const double knot : {*(above - 1), *above})
+      if (std::abs(u - knot) <= rounding * width) u = knot;
+  }
+}
+
 // Greville abscissae of the splines of degree p - `lower`. Where two meet, each for one side of a C0 line or of a seam,
 // the earlier one is moved half of its way back.
 std::vector<double> greville_lines(const KnotVector& knots, int lower, bool closed) {
@@ -60,20 +71,10 @@ std::vector<double> greville_lines(const KnotVector& knots, int lower, bool clos
     lines.push_back(std::clamp(u / (knots.degree() - lower), domain.min, domain.max));
   }
   if (closed) lines.push_back(domain.max);
+  snap(lines, knots.breaks());
   for (std::size_t k = 1; k + 1 < lines.size(); ++k)
     if (lines[k] == lines[k + 1]) lines[k] = 0.5 * (lines[k - 1] + lines[k]);
   return lines;
-}
-
-// Lines that are knot lines but for rounding become so.
-void snap(std::vector<double>& lines, const std::vector<double>& breaks) {
-  constexpr double rounding = 1e-9;  // of a span
-  for (double& u : lines) {
-    const auto above = std::upper_bound(breaks.begin() + 1, breaks.end() - 1, u);
-    const double width = *above - *(above - 1);
-    for (const double knot : {*(above - 1), *above})
-      if (std::abs(u - knot) <= rounding * width) u = knot;
-  }
 }
 
 // The lines of a rule besides the knot lines.

@@ -11,8 +11,8 @@ std::vector<ThreadStress> row_stress(const ShellModel& model, const ConstraintRo
     const ShellState fabric = model.state(row.panel, row.uv.x(), row.uv.y(), q);
     const double limit = row_force[static_cast<Eigen::Index>(r)] / row.area;
     const Eigen::Vector2d share = row.thread.cwiseAbs2();
-    out.push_back({share.dot(fabric.second_pk.head<2>()) + limit / apply(row.row, q).norm(),
-                   share.dot(fabric.nominal) + limit});
+    out.push_back(
+        {share.dot(fabric.second_pk.head<2>()) + limit / apply(row.row, q).norm(), share.dot(fabric.nominal) + limit});
   }
   return out;
 }

@@ -61,6 +61,7 @@ BoundaryCurves curve_on_surface(Reading& reading, const Entry& e, int surface) {
     }
   }
   if (!lost.empty()) reading.notes.add("bad model curve", lost);
+  if (out.model.empty() && out.parameter.empty()) in.fail("its curves are points only");
   return out;
 }
 

@@ -125,7 +125,13 @@ void read_marks(Reading& reading, std::span<const Entry* const> faces, std::span
       }
       if (held.size() != 1 || marks.empty()) continue;
       MarkReader reader(reading, panels[held[0]]);
-      for (const Entry* e : marks) reader.read(*e);
+      for (const Entry* e : marks) {
+        try {
+          reader.read(*e);
+        } catch (const Error& error) {
+          reading.note(*e, "mark", std::string("it can't be read: ") + error.what());
+        }
+      }
     } catch (const Error& error) {
       reading.note(group, "marks", std::string("its marks can't be read: ") + error.what());
     }

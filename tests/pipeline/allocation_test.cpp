@@ -15,13 +15,12 @@ using test::Folder;
 
 // Allocations of each step of a run without frames on the way, with a step that needs no bound.
 std::vector<long> allocations_by_step(const std::string& name, const std::string& pins, const std::string& more,
-                                      const std::vector<std::string>& settings, int threads = 1) {
+                                      const std::vector<std::string>& settings) {
   const Folder folder(name);
   test::write_panels(folder / "panel.igs", {test::sheet("cloth")});
   std::vector<std::string> all = settings;
   all.insert(all.begin(), {"solver.dt=5e-4", "solver.until=0.05", "output.every=1000"});
   const Build b = build(parse_scene(test::scene_text(pins, more), folder / "scene.toml", all));
-  b.model->use_threads(threads);
   std::vector<long> counts;
   counts.reserve(100000);
   RunHooks hooks;
