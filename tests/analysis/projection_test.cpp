@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <limits>
 
 #include "analysis/flat_cloth.h"
 #include "analysis/projection/fast_projection.h"
@@ -64,6 +65,17 @@ TYPED_TEST(AnySolver, SaysThatItDidNotConverge) {
   EXPECT_FALSE(report.converged);
   EXPECT_EQ(report.iterations, 1);
   EXPECT_GT(report.strain_violation, 1e-9);
+}
+
+TYPED_TEST(AnySolver, PlacesThatAreNoNumbersMeetNothing) {
+  const FlatCloth c = flat_cloth(2, 8);
+  TypeParam projection(free_map(c), c.mass, {vertex_rows(c), {}});
+  for (const Eigen::Index at : {Eigen::Index{0}, c.rest.size() - 1}) {
+    Eigen::VectorXd x = c.rest;
+    x[at] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(projection.measure(x, 0).converged) << at;
+    EXPECT_FALSE(projection.project(x, 0).converged) << at;
+  }
 }
 
 TYPED_TEST(AnySolver, ProjectsOnceEvenWhereEverythingIsMet) {

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <ostream>
 
+#include "geometry/error.h"
 #include "io/iges_corpus.h"
 #include "io/panel_facts.h"
 #include "support/near.h"
@@ -60,6 +61,19 @@ TEST(OddIges, SortedCurvesKeepTheFilesNumbers) {
   std::vector<int> numbers;
   for (const TrimCurve& c : loop.curves) numbers.push_back(c.index);
   EXPECT_EQ(numbers, (std::vector<int>{0, 2, 1, 3}));
+}
+
+// Else the face would come untrimmed.
+TEST(OddIges, ABoundaryOfPointsOnlyIsRefused) {
+  std::string text = test::corpus_text("points_in_composite");
+  const std::string composite = "102,5,11,3,5,7,9;";
+  text.replace(text.find(composite), composite.size(), "102,1,11;        ");
+  try {
+    parse_iges(text, "points.igs");
+    FAIL() << "a face came back";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "points.igs:35: entity 142: its curves are points only");
+  }
 }
 
 }  // namespace
