@@ -18,7 +18,10 @@ constexpr int patience = 15;         // iterations without gain before giving up
 constexpr double least_gain = 0.99;  // a violation above this times the best so far is no gain
 constexpr double poor_gain = 0.25;   // an iteration that leaves more than this of the residual asks for a new factor
 constexpr double no_gain = 0.5;      // more than this left: the directions at hand no longer lead there
-constexpr double damped_residual = 0.1;    // what damps anyway needn't be exact
+constexpr double damped_residual = 0.1;  // what damps anyway needn't be exact
+// What a step leaves undone the next one makes up for in its own time, with a velocity of rest / dt: the rest that is
+// allowed falls with dt, but not below rounding.
+constexpr double least_exactness = 1e-6;
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 
 // Of the law's forces at the end of a step, at its start, one and two steps before: see `step`.
@@ -46,6 +49,7 @@ struct FastProjection::Impl {
   Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
   Eigen::VectorXd scale, residual, rhs, solution, candidate;
   Eigen::VectorXd strain_lambda, compliance;  // compliance 0: hard
+  double exactness = 1;                       // of the residuals that are allowed in a step, see `step`
   Eigen::VectorXd share;                      // of the force at the end in what acts in a step
   std::vector<char> slack;                    // within the band without a force: takes no part for now
   Eigen::Matrix3Xd place_lambda, strain_impulse;
@@ -147,6 +151,7 @@ void FastProjection::Impl::begin(double t) {
   map.fixed_places(t, fixed_places);
   for (int p = 0; p < places(); ++p) targets.col(p) = rows.place[p].target(t);
   compliance.setZero();
+  exactness = 1;
   clear();
 }
 
@@ -282,10 +287,10 @@ ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, Di
   bool factored = false;
   while (true) {
     measure(x, report);
-    const double excess =
-        std::max({report.strain_violation / std::max(options.tolerance, 1e-30),
-                  report.place_violation / std::max(options.place_tolerance, 1e-30),
-                  report.residual / (directions == Directions::start ? options.residual : damped_residual)});
+    const double excess = std::max(
+        {report.strain_violation / std::max(options.tolerance, 1e-30),
+         report.place_violation / std::max(options.place_tolerance, 1e-30),
+         report.residual / (exactness * (directions == Directions::start ? options.residual : damped_residual))});
     if (size() == 0 || (report.converged && excess <= 1 && report.iterations >= options.min_iterations)) break;
     if (report.iterations >= options.max_iterations) break;
     if (!std::isfinite(excess)) break;
@@ -335,6 +340,10 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   s.point_along(s.tangents);
   s.complete(forces);
   const double dt2 = dt * dt;
+  s.exactness = 1;
+  for (int r = 0; r < s.strains(); ++r)
+    if (s.has_law(r) && s.rows.strain[r].damping_rate > 0)
+      s.exactness = std::clamp(s.rows.strain[r].damping_rate * dt, least_exactness, s.exactness);
   s.candidate = x;
   // What the steps before are owed, and as a first guess that the forces stay as they are.
   for (int r = 0; r < s.strains(); ++r) {
@@ -353,7 +362,7 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
     s.rhs[i] = dt2 * forces.place((i - s.strains()) % 3, (i - s.strains()) / 3) / s.scale[i];
   s.push(s.rhs, x);
   ProjectionReport report = s.iterate(x, Impl::Directions::start);
-  if (!report.converged || report.residual > s.options.residual) {
+  if (!report.converged || report.residual > s.exactness * s.options.residual) {
     // From no force on.
     x = s.candidate;
     s.clear();
