@@ -29,7 +29,7 @@ Scene make_scene(ShellPanel panel, const std::function<Eigen::VectorXd(const She
   for (int k = 0; k < n; ++k)
     if (model.lumped_mass()[k] == 0 || std::find(pinned.begin(), pinned.end(), k) != pinned.end()) fixed.push_back(k);
   const Eigen::VectorXd q = state(model);
-  AffineMap map(AffineMap::identity(n), fixed, [&model, q](std::size_t, double) { return Eigen::Vector3d(0, 0, 0); });
+  AffineMap map(AffineMap::identity(n), fixed, [](std::size_t, double) { return Eigen::Vector3d(0, 0, 0); });
   const CutQuadrature& rule = model.panels()[0].quadrature;
   const double floor =
       mass_floor * model.lumped_mass().sum() / rule.area * rule.cells[0].area / rule.cells[0].cut_fraction;
