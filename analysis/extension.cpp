@@ -208,7 +208,7 @@ Eigen::Vector3d Extender::follow(const Row& row) const {
 
 double Extender::cell_size(Host host) const {
   const SurfaceJet s = evaluate(rest_, u_.middle(host.i), v_.middle(host.j));
-  return std::sqrt(s.u.cross(s.v).norm() * u_.length(host.i) * v_.length(host.j));
+  return std::sqrt(s.area_scale() * u_.length(host.i) * v_.length(host.j));
 }
 
 void Extender::keep_what_moves_the_rest() {
@@ -378,7 +378,7 @@ Eigen::VectorXd mass_floor(const NurbsSurface& rest, double density, double frac
         return std::clamp(g, line.breaks.front(), line.breaks.back());
       };
       const SurfaceJet s = evaluate(rest, inside(u, rest.u().greville(i)), inside(v, rest.v().greville(j)));
-      floor[rest.index(i, j)] = fraction * density * s.u.cross(s.v).norm() * mean_span(u, i) * mean_span(v, j);
+      floor[rest.index(i, j)] = fraction * density * s.area_scale() * mean_span(u, i) * mean_span(v, j);
     }
   return floor;
 }

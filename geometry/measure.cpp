@@ -39,8 +39,7 @@ double cell_area(const NurbsSurface& surface, const Cell& cell) {
     for (int i = 0; i < 8; ++i) points[i + 8 * j] << node(cell.u, i), node(cell.v, j);
   evaluate_on_span(surface, cell.span_u, cell.span_v, points, jets);
   double sum = 0;
-  for (std::size_t k = 0; k < 64; ++k)
-    sum += gauss8_w[k % 8 / 2] * gauss8_w[k / 16] * jets[k].u.cross(jets[k].v).norm();
+  for (std::size_t k = 0; k < 64; ++k) sum += gauss8_w[k % 8 / 2] * gauss8_w[k / 16] * jets[k].area_scale();
   return sum * cell.u.length() * cell.v.length() / 4;
 }
 

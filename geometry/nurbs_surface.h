@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <vector>
 
@@ -49,6 +50,7 @@ class NurbsSurface {
 // Position and partial derivatives at a parameter.
 struct SurfaceJet {
   Eigen::Vector3d x, u, v, uu, uv, vv;
+  double area_scale() const { return u.cross(v).norm(); }  // area in space per area in the parameter plane
 };
 SurfaceJet evaluate(const NurbsSurface& surface, double u, double v);
 // The same of the piece on the named spans (knot indices), continued where the point lies outside: one-sided

@@ -36,6 +36,14 @@ TrimLoop natural_loop(const NurbsSurface& surface) {
   return loop;
 }
 
+TrimmedSurface untrimmed(NurbsSurface surface) {
+  TrimmedSurface face;
+  face.loops = {natural_loop(surface)};
+  face.natural_bounds = true;
+  face.surface = std::move(surface);
+  return face;
+}
+
 std::optional<double> grain_angle(const TrimmedSurface& face) {
   const auto mark = std::ranges::find(face.marks, MarkKind::grain, &PanelMark::kind);
   if (mark == face.marks.end() || !mark->curve) return std::nullopt;

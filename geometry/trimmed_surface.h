@@ -55,6 +55,8 @@ struct TrimmedSurface {
 
 // Border of the domain as one loop of four lines: curves 0 to 3 from v = min, counter-clockwise.
 TrimLoop natural_loop(const NurbsSurface& surface);
+// The whole of a surface as a face: its natural loop, natural_bounds set.
+TrimmedSurface untrimmed(NurbsSurface surface);
 
 // Angle of the weft against the u direction [rad, (-pi/2, pi/2], positive towards v], where the panel has a grain line:
 // the grain runs along the warp, the weft at right angles to it.

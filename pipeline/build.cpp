@@ -180,7 +180,7 @@ Eigen::VectorXd row_sums(const NurbsSurface& rest, const CutQuadrature& rule, do
   for (std::size_t k = 0; k < rule.points.size(); ++k) {
     evaluate_basis(rest, rule.points[k].x(), rule.points[k].y(), basis);
     const SurfaceJet jet = evaluate(rest, rule.points[k].x(), rule.points[k].y());
-    const double m = rule.weights[k] * density * jet.u.cross(jet.v).norm();
+    const double m = rule.weights[k] * density * jet.area_scale();
     for (int b = 0; b < basis.count_v; ++b) {
       for (int a = 0; a < basis.count_u; ++a) {
         mass[rest.index(basis.first_u + a, basis.first_v + b)] +=

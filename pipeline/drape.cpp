@@ -102,6 +102,22 @@ bool holds(const std::filesystem::path& directory, const std::filesystem::path& 
   return std::filesystem::equivalent(directory, std::filesystem::absolute(file).parent_path(), error);
 }
 
+// The limit is held at its points; where the cloth between them is stretched much farther, they lie too far apart.
+std::string stretched_between_points(const StrainLimit& limit, const StateMeasures& measures) {
+  constexpr double much = 3;
+  if (!limit.on) return {};
+  for (int d : {0, 1}) {
+    const double allowed = (d == 0 ? limit.weft : limit.warp).stretch, seen = measures.strain.p999[d];
+    if (seen > much * allowed)
+      return fmt::format(
+          "between the points that hold the limit of {:.2g}, the {} is strained by {:.2g} and more on a thousandth of "
+          "the "
+          "cloth: a smaller span holds it in more places",
+          allowed, d == 0 ? "weft" : "warp", seen);
+  }
+  return {};
+}
+
 }  // namespace
 
 int drape(Scene scene, const DrapeOptions& options, Console& console) {
@@ -197,6 +213,10 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   // The forces of a refused step are not those of the state that it started from.
   const double forces_of = result.exit == RunExit::solver_failed ? 0 : result.dt_last;
   const StateMeasures measures = measure(built, *result.system, result.state, forces_of);
+  if (const std::string between = stretched_between_points(built.scene.strain_limit, measures); !between.empty()) {
+    result.warnings.push_back(between);
+    console.warning(between);
+  }
   const std::string report = json_text(report_json(built, result, measures, since(writing))) + "\n";
   write_file(directory / "report.json", report);
   log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit),

@@ -440,7 +440,7 @@ void draw_legend(Svg& svg, Vector2d at, double width) {
 }
 
 std::string title_of(const InspectedPanel& panel, std::size_t number) {
-  return panel.face.name.empty() ? fmt::format("panel {}", number) : panel.face.name;
+  return panel.face.name.empty() ? fmt::format("panel_{}", number) : panel.face.name;
 }
 
 struct Drawing {

@@ -78,8 +78,7 @@ double unseen_energy(const Build& build, const System& system, const Eigen::Vect
       const Eigen::Vector2d& uv = panel.quadrature.points[p];
       const SurfaceJet jet = evaluate(panel.rest, uv.x(), uv.y());
       const ShellState at = model.state(static_cast<int>(k), uv.x(), uv.y(), q);
-      energy += 0.5 * panel.quadrature.weights[p] * jet.u.cross(jet.v).norm() *
-                at.second_pk.head<2>().dot(at.strain.head<2>());
+      energy += 0.5 * panel.quadrature.weights[p] * jet.area_scale() * at.second_pk.head<2>().dot(at.strain.head<2>());
     }
   }
   for (const StrainRow& row : system.projection->rows().strain) {
@@ -121,7 +120,7 @@ std::vector<GridSample> grid_samples(const Build& build, int n) {
         const Eigen::Vector2d uv(u.min + u.length() * (i + 0.5) / n, v.min + v.length() * (j + 0.5) / n);
         if (!contains(panel.face, panel.topology, uv)) continue;
         const SurfaceJet jet = evaluate(rest, uv.x(), uv.y());
-        samples.push_back({static_cast<int>(k), uv, cell * jet.u.cross(jet.v).norm()});
+        samples.push_back({static_cast<int>(k), uv, cell * jet.area_scale()});
       }
     }
   }
@@ -184,7 +183,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   for (const ShellPanel& panel : model.panels()) {
     for (std::size_t k = 0; k < panel.quadrature.points.size(); ++k) {
       const SurfaceJet jet = evaluate(panel.rest, panel.quadrature.points[k].x(), panel.quadrature.points[k].y());
-      const double area = panel.quadrature.weights[k] * jet.u.cross(jet.v).norm();
+      const double area = panel.quadrature.weights[k] * jet.area_scale();
       m.area += area;
       m.mass += area * panel.fabric.density;
     }

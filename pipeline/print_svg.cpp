@@ -189,7 +189,7 @@ std::string print_svg(const PanelFile& file) {
   double row = 0;
   for (std::size_t k = 0; k < file.panels.size(); ++k) {
     const TrimmedSurface& face = file.panels[k];
-    const std::string name = face.name.empty() ? fmt::format("panel {}", k + 1) : face.name;
+    const std::string name = face.name.empty() ? fmt::format("panel_{}", k + 1) : face.name;
     const std::optional<DrawingPlane> plane = drawing_plane(face.surface);
     if (!plane) {
       throw GeometryError(

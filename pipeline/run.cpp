@@ -384,11 +384,20 @@ class Loop {
     if (p.strain_violation > scene_.strain_limit.tolerance)
       where += fmt::format("; the strain limit is broken by {:.3g} {}", p.strain_violation, worst_place());
     if (p.place_violation > 1e-6) where += fmt::format("; a pin is missed by {:.3g} m", p.place_violation);
-    result_.reason = fmt::format(
-        "at t = {:.6g} s {}{}. Use dt = \"auto\" or a smaller dt, a larger strain_limit.tolerance or regularisation, "
-        "or look "
-        "for pins that contradict each other",
-        result_.state.t, what, where);
+    std::string advice = scene_.dt ? "Use dt = \"auto\" or a smaller dt" : "Use a smaller dt";
+    const StrainLimit& limit = scene_.strain_limit;
+    if (limit.on) {
+      for (std::size_t k = 0; limit.stiffness && k < build_.panels.size(); ++k) {
+        if (*limit.stiffness > default_limit_stiffness(build_, static_cast<int>(k))) {
+          advice += ", a lower strain_limit.stiffness";
+          break;
+        }
+      }
+      advice += limit.weft.slack == 0 ? ", a larger strain_limit.tolerance or regularisation" : ", wider limits";
+    }
+    result_.reason =
+        fmt::format("at t = {:.6g} s {}{}. {}, or look for pins that contradict each other or pull too hard",
+                    result_.state.t, what, where, advice);
   }
 
   void report_limit() {

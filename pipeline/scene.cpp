@@ -517,6 +517,10 @@ void read_settings(Table& top, Scene& scene) {
     throw InputError(fmt::format("{}: until = {} s with a frame every {} s would be more than a million frames",
                                  scene.path.string(), scene.until, scene.every));
   }
+  if (!scene.rest && scene.dt && scene.until / *scene.dt > 1e9) {
+    throw InputError(fmt::format("{}: dt = {} s up to until = {} s would be more than a thousand million steps",
+                                 scene.path.string(), *scene.dt, scene.until));
+  }
 }
 
 // A release that misses a frame, another release or the end by rounding is meant to be there; the step between them
@@ -579,7 +583,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
     }
     if (panel.name.empty()) {
       panel.named = false;
-      panel.name = fmt::format("panel {}", scene.panels.size());
+      panel.name = fmt::format("panel_{}", scene.panels.size());
     }
   }
   if (scene.panels.empty()) throw InputError(fmt::format("{}: the scene has no [[panel]]", path.string()));
@@ -649,7 +653,7 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
     const bool taken = std::ranges::any_of(scene.panels, [&](const ScenePanel& p) { return p.name == panel.name; });
     panel.named = !panel.name.empty() && !taken;
     panel.order = static_cast<int>(k);
-    if (!panel.named) panel.name = fmt::format("panel {}", k + 1);
+    if (!panel.named) panel.name = fmt::format("panel_{}", k + 1);
     if (!panel.start) {
       panel.degree = request.degree;
       panel.span = request.span;

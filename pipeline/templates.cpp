@@ -60,11 +60,8 @@ formats = ["vtu"]                             # also "iges", "obj"
 }
 
 TrimmedSurface hang() {
-  TrimmedSurface face;
+  TrimmedSurface face = untrimmed(sheet({0, 600}, {0, 600}, 8, 8));
   face.name = "cloth";
-  face.surface = sheet({0, 600}, {0, 600}, 8, 8);
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
   return face;
 }
 

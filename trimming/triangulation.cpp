@@ -87,7 +87,7 @@ class Mesher {
                      v0 = mesh.v[static_cast<std::size_t>(j)], v1 = mesh.v[static_cast<std::size_t>(j) + 1];
         const SurfaceJet jet = evaluate(surface_.surface, u0 + (u1 - u0) / 2, v0 + (v1 - v0) / 2);
         metric += Eigen::Vector3d(jet.u.dot(jet.u), jet.u.dot(jet.v), jet.v.dot(jet.v));
-        area_ += jet.u.cross(jet.v).norm() * (u1 - u0) * (v1 - v0);
+        area_ += jet.area_scale() * (u1 - u0) * (v1 - v0);
         ++cells;
       }
     }

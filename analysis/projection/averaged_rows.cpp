@@ -16,11 +16,6 @@ struct RowSum {
   void add(const MaterialPoint& point, int which, double factor) {
     for (std::size_t k = 0; k < point.index.size(); ++k) entries[point.index[k]] += factor * point.value[which][k];
   }
-  Eigen::Vector3d apply(const Eigen::VectorXd& q) const {
-    Eigen::Vector3d y = Eigen::Vector3d::Zero();
-    for (const auto& [i, value] : entries) y += value * q.segment<3>(3 * i);
-    return y;
-  }
   ScalarRow over(double length) const {
     ScalarRow row;
     for (const auto& [i, value] : entries) {
@@ -32,15 +27,15 @@ struct RowSum {
   }
 };
 
-double parameter_area_scale(const NurbsSurface& rest, const Eigen::Vector2d& uv) {
-  const SurfaceJet jet = evaluate(rest, uv.x(), uv.y());
-  return jet.u.cross(jet.v).norm();
+// Of the cloth at a quadrature point.
+double area_at(const ShellPanel& panel, int point) {
+  const Eigen::Vector2d& uv = panel.quadrature.points[point];
+  return panel.quadrature.weights[point] * evaluate(panel.rest, uv.x(), uv.y()).area_scale();
 }
 
 double material_area(const ShellPanel& panel, const CellRule& cell) {
   double area = 0;
-  for (int k = cell.first; k < cell.first + cell.count; ++k)
-    area += panel.quadrature.weights[k] * parameter_area_scale(panel.rest, panel.quadrature.points[k]);
+  for (int k = cell.first; k < cell.first + cell.count; ++k) area += area_at(panel, k);
   return area;
 }
 
@@ -53,7 +48,7 @@ std::vector<StrainRow> cell_averages(const ShellModel& model, int index) {
     Eigen::Vector2d middle(0, 0);
     for (int k = cell.first; k < cell.first + cell.count; ++k) {
       const Eigen::Vector2d& uv = panel.quadrature.points[k];
-      const double weight = panel.quadrature.weights[k] * parameter_area_scale(panel.rest, uv);
+      const double weight = area_at(panel, k);
       const MaterialPoint point = model.material_point(index, uv.x(), uv.y());
       for (int d : {0, 1}) sums[d].add(point, 1 + d, weight);
       area += weight;
@@ -61,7 +56,7 @@ std::vector<StrainRow> cell_averages(const ShellModel& model, int index) {
     }
     middle /= area;
     for (int d : {0, 1}) {
-      const double length = sums[d].apply(model.rest()).norm();
+      const double length = apply(sums[d].over(1), model.rest()).norm();
       rows.push_back({sums[d].over(length), index, -1, d == 1, area, 0, 0, middle, Eigen::Vector2d::Unit(d)});
     }
   }
@@ -88,7 +83,7 @@ std::vector<StrainRow> springs(const ShellModel& model, int index, const TrimTop
     RowSum sum;
     sum.add(model.material_point(index, mesh.u[bi], mesh.v[bj]), 0, 1);
     sum.add(model.material_point(index, mesh.u[ai], mesh.v[aj]), 0, -1);
-    const Eigen::Vector3d along = sum.apply(model.rest());
+    const Eigen::Vector3d along = apply(sum.over(1), model.rest());
     const double length = along.norm();
     if (!(length > 0))
       throw GeometryError("panel '" + panel.name + "': a spring between (u, v) = (" + std::to_string(mesh.u[ai]) +
@@ -99,7 +94,7 @@ std::vector<StrainRow> springs(const ShellModel& model, int index, const TrimTop
     for (int d : {0, 1}) {
       RowSum tangent;
       tangent.add(frame, 1 + d, 1);
-      thread[d] = tangent.apply(model.rest()).dot(along);
+      thread[d] = apply(tangent.over(1), model.rest()).dot(along);
     }
     thread.normalize();
     rows.push_back(

@@ -16,7 +16,8 @@ namespace toile {
 //   They follow the net, not the threads; at trims nothing is held, and a spring may bridge a gap within a cell.
 // PointRule::springs_triangle: the same and one diagonal of every cell whose ends are in the material, in turns.
 // Other rules have none. Areas: a cell's own; for springs half of the cells beside them, so that those along u add up
-// to the panel, as do those along v. Rows are hard.
+// to an untrimmed panel, as do those along v (at trims a spring without both ends takes its cloth with it); diagonals
+// their cell. Rows are hard.
 //   (1) C = 0 at rest; (2) springs over a seam of a closed surface are taken once.
 // Throws GeometryError where two neighbouring vertices are one place.
 std::vector<StrainRow> averaged_rows(const ShellModel& model, int panel, const TrimTopology& topology,

@@ -46,7 +46,7 @@ Eigen::MatrixX3d integrals(const ShellModel& model) {
     for (std::size_t p = 0; p < panel.quadrature.points.size(); ++p) {
       const Eigen::Vector2d& uv = panel.quadrature.points[p];
       const SurfaceJet jet = evaluate(panel.rest, uv.x(), uv.y());
-      const double area = panel.quadrature.weights[p] * jet.u.cross(jet.v).norm();
+      const double area = panel.quadrature.weights[p] * jet.area_scale();
       const MaterialPoint point = model.material_point(static_cast<int>(k), uv.x(), uv.y());
       for (std::size_t i = 0; i < point.index.size(); ++i)
         for (int c = 0; c < 3; ++c) sum(point.index[i], c) += area * point.value[c][i];
@@ -99,14 +99,21 @@ void weigh_rows(const ShellModel& model, const AffineMap& map, const std::vector
     const Matrix reach = matrix_of(members, n, [&](std::size_t r) -> const ScalarRow& { return values[r]; }) * nodes;
     const Matrix slopes = matrix_of(members, n, [&](std::size_t r) -> const ScalarRow& { return rows[r].row; }) * nodes;
     const Eigen::VectorXd share = shares(reach, whole.col(0));
-    // One equation a node, for the areas over their shares less 1; the largest of unit length.
+    // One equation a node, for the areas over their shares less 1; each panel's longest of unit length.
     Matrix equations = slopes.transpose() * share.asDiagonal();
     Eigen::VectorXd missing = whole.col(warp ? 2 : 1) - slopes.transpose() * share;
-    double longest = 0;
-    for (int i = 0; i < equations.rows(); ++i) longest = std::max(longest, equations.row(i).norm());
-    if (longest > 0) {
-      equations /= longest;
-      missing /= longest;
+    const auto panel_of = [&](int equation) {  // rows of other panels don't meet its node; -1: none does
+      const Matrix::InnerIterator e(equations, equation);
+      return e ? rows[members[static_cast<std::size_t>(e.col())]].panel : -1;
+    };
+    std::vector<double> longest(model.panels().size(), 0);
+    for (int i = 0; i < equations.rows(); ++i)
+      if (const int panel = panel_of(i); panel >= 0) longest[panel] = std::max(longest[panel], equations.row(i).norm());
+    for (int i = 0; i < equations.rows(); ++i) {
+      const int panel = panel_of(i);
+      const double scale = panel >= 0 && longest[panel] > 0 ? 1 / longest[panel] : 0;
+      equations.row(i) *= scale;
+      missing[i] *= scale;
     }
     const Eigen::VectorXd factor =
         (1 + damped_least_squares(equations, missing, options).array()).max(options.least).min(options.most);

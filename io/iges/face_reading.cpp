@@ -114,10 +114,7 @@ std::vector<TrimmedSurface> panels_of(Reading& reading, const Entry& e) {
   if (name.empty()) name = surface_name;
   std::vector<TrimmedSurface> panels;
   if (boundaries.empty() || record.bounded_by_domain) {
-    TrimmedSurface whole;
-    whole.surface = base.surface;
-    whole.loops.push_back(natural_loop(base.surface));
-    whole.natural_bounds = boundaries.empty();
+    TrimmedSurface whole = untrimmed(base.surface);
     if (!boundaries.empty()) {
       // Every loop is a hole in the domain: as if its border were given.
       std::vector<BoundaryCurves> all(1);

@@ -63,14 +63,6 @@ void write(const std::filesystem::path& file, TrimmedSurface face, const std::st
   write_file(file, format_iges(std::span(&output, 1), header).text);
 }
 
-TrimmedSurface untrimmed(NurbsSurface surface) {
-  TrimmedSurface face;
-  face.surface = std::move(surface);
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
-  return face;
-}
-
 TrimmedSurface trimmed(NurbsSurface surface, TrimLoop loop) {
   TrimmedSurface face;
   face.surface = std::move(surface);

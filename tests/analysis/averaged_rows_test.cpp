@@ -25,13 +25,6 @@ Cloth cloth(TrimmedSurface face, double grain = 0) {
   std::vector<ShellPanel> panels{panel};
   return {face, topology, ShellModel(std::move(panels))};
 }
-TrimmedSurface untrimmed(NurbsSurface surface) {
-  TrimmedSurface face;
-  face.surface = std::move(surface);
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
-  return face;
-}
 TrimmedSurface square(int degree, int spans) {
   return untrimmed(test::flat_surface(1, 1, uniform_knots(degree, spans), uniform_knots(degree, spans)));
 }

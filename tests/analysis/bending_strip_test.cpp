@@ -18,14 +18,6 @@ namespace {
 
 using test::Random;
 
-TrimmedSurface untrimmed(const NurbsSurface& surface) {
-  TrimmedSurface face;
-  face.surface = surface;
-  face.loops = {natural_loop(surface)};
-  face.natural_bounds = true;
-  return face;
-}
-
 ShellPanel kinked_panel(const NurbsSurface& rest, const Fabric& fabric, double grain = 0) {
   ShellPanel panel = test::make_panel(rest, fabric, grain);
   const TrimmedSurface face = untrimmed(rest);

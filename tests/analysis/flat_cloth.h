@@ -76,9 +76,7 @@ inline Eigen::VectorXd disturbed(const Eigen::VectorXd& q, double size, unsigned
 }
 
 inline double strain(const ScalarRow& row, const Eigen::VectorXd& q) {
-  Eigen::Vector3d y = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * q.segment<3>(3 * row.index[k]);
-  return 0.5 * (y.squaredNorm() - 1);
+  return 0.5 * (apply(row, q).squaredNorm() - 1);
 }
 
 }  // namespace toile::test

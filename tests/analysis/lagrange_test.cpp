@@ -23,11 +23,6 @@ struct Equations {
   const ConstraintRows& rows;
   Eigen::VectorXd candidate;
 
-  static Eigen::Vector3d value(const ScalarRow& row, const Eigen::VectorXd& x) {
-    Eigen::Vector3d y = Eigen::Vector3d::Zero();
-    for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * x.segment<3>(3 * row.index[k]);
-    return y;
-  }
   static void spread(const ScalarRow& row, const Eigen::Vector3d& w, Eigen::VectorXd& to) {
     for (std::size_t k = 0; k < row.index.size(); ++k) to.segment<3>(3 * row.index[k]) += row.value[k] * w;
   }
@@ -39,7 +34,7 @@ struct Equations {
   Eigen::VectorXd force(const Eigen::VectorXd& x, const ProjectionMemory& m) const {
     Eigen::VectorXd f = inertia(x);
     for (std::size_t r = 0; r < rows.strain.size(); ++r)
-      spread(rows.strain[r].row, m.strain_multipliers[r] * value(rows.strain[r].row, x), f);
+      spread(rows.strain[r].row, m.strain_multipliers[r] * apply(rows.strain[r].row, x), f);
     for (std::size_t p = 0; p < rows.place.size(); ++p) spread(rows.place[p].row, m.place_multipliers.col(p), f);
     return f;
   }
@@ -78,7 +73,7 @@ TEST(LagrangeNewton, AnIterationSolvesTheDerivativeOfItsEquations) {
   EXPECT_LT((derivative + force(0)).norm(), 1e-7 * force(0).norm());
   const auto C = [&](double s) { return equations.strains(x[0] + s * dx); };
   EXPECT_LT(((C(h) - C(-h)) / (2 * h) + C(0)).norm(), 1e-5 * C(0).norm());  // softness 1e-8, weakest rows 1e-3
-  EXPECT_LT((Equations::value(rows.place[0].row, x[1]) - target).norm(), 1e-9);
+  EXPECT_LT((apply(rows.place[0].row, x[1]) - target).norm(), 1e-9);
 }
 
 TEST(LagrangeNewton, ErrorsAreSquaredFromIterationToIteration) {
@@ -114,10 +109,8 @@ TEST(LagrangeNewton, ForcesPointAlongTheGradientsAtTheEnd) {
   EXPECT_LT(linear.norm(), 1e-13 * size);
   EXPECT_LT(angular.norm(), 1e-9 * size);
   for (std::size_t r = 0; r < rows.strain.size(); ++r)
-    EXPECT_LT(
-        (solver.strain_impulses().col(r) - solver.strain_multipliers()[r] * Equations::value(rows.strain[r].row, x))
-            .norm(),
-        1e-15);
+    EXPECT_LT((solver.strain_impulses().col(r) - solver.strain_multipliers()[r] * apply(rows.strain[r].row, x)).norm(),
+              1e-15);
 }
 
 // However far from balance an iteration is: what it pushes sums to nothing.

@@ -16,14 +16,6 @@
 namespace toile {
 namespace {
 
-TrimmedSurface untrimmed(NurbsSurface surface) {
-  TrimmedSurface face;
-  face.surface = std::move(surface);
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
-  return face;
-}
-
 TrimmedSurface square(int degree, int spans) {
   return untrimmed(test::flat_surface(1, 1, uniform_knots(degree, spans), uniform_knots(degree, spans)));
 }

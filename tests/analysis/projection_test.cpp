@@ -279,9 +279,7 @@ Eigen::VectorXd impulse_of(const FastProjection& projection, const Eigen::Vector
   Eigen::VectorXd impulse = Eigen::VectorXd::Zero(at.size());
   const auto& rows = projection.rows().strain;
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    Eigen::Vector3d y = Eigen::Vector3d::Zero();
-    for (std::size_t k = 0; k < rows[r].row.index.size(); ++k)
-      y += rows[r].row.value[k] * at.segment<3>(3 * rows[r].row.index[k]);
+    const Eigen::Vector3d y = apply(rows[r].row, at);
     for (std::size_t k = 0; k < rows[r].row.index.size(); ++k)
       impulse.segment<3>(3 * rows[r].row.index[k]) -= multipliers[r] * rows[r].row.value[k] * y;
   }

@@ -46,11 +46,7 @@ Strip finish(TrimmedSurface surface, double grain) {
 Strip fitted_strip(double width, double height, double cell) {
   const NurbsSurface flat = test::flat_surface(width, height, uniform_knots(2, int(std::lround(width / cell))),
                                                uniform_knots(2, int(std::lround(height / cell))));
-  TrimmedSurface surface;
-  surface.surface = flat.with_points(flat.points().colwise() - Eigen::Vector3d(width / 2, height / 2, 0));
-  surface.loops = {natural_loop(surface.surface)};
-  surface.natural_bounds = true;
-  return finish(surface, 0);
+  return finish(untrimmed(flat.with_points(flat.points().colwise() - Eigen::Vector3d(width / 2, height / 2, 0))), 0);
 }
 Strip trimmed_strip(double width, double height, double cell, double angle) {
   const double half = std::ceil(0.55 * std::hypot(width, height) / cell) * cell;

@@ -14,11 +14,7 @@ namespace toile {
 namespace {
 
 TrimmedSurface square(int degree, int spans) {
-  TrimmedSurface face;
-  face.surface = test::flat_surface(1, 1, uniform_knots(degree, spans), uniform_knots(degree, spans));
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
-  return face;
+  return untrimmed(test::flat_surface(1, 1, uniform_knots(degree, spans), uniform_knots(degree, spans)));
 }
 
 struct Limited {

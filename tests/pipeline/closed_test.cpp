@@ -31,12 +31,9 @@ Build built(const TrimmedSurface& face, const std::string& scene) {
 }
 
 TrimmedSurface face_of(NurbsSurface surface) {
-  TrimmedSurface face;
+  TrimmedSurface face = untrimmed(std::move(surface));
   face.name = "cloth";
-  face.surface = std::move(surface);
   face.metres_per_unit = 1e-3;
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
   return face;
 }
 
@@ -171,7 +168,8 @@ TEST(Closed, ASeamsPointsAreTakenOnce) {
     EXPECT_GT(seam, 0);
     for (const ConstraintPoint& point : b.panels[0].points) {
       EXPECT_FALSE(point.used && point.u == 12) << point.v;
-      EXPECT_TRUE(point.used || point.u == 12 || degree == 3) << point.u << ' ' << point.v;  // at p = 3 others are taken
+      EXPECT_TRUE(point.used || point.u == 12 || degree == 3)
+          << point.u << ' ' << point.v;  // at p = 3 others are taken
     }
   }
 }

@@ -20,11 +20,10 @@ constexpr double radius = 0.23;
 PanelFile flat_panel(bool hole, double metres_per_unit = 1) {
   const KnotVector knots = uniform_knots(2, 5);
   const double side = 1 / metres_per_unit;
-  TrimmedSurface face;
+  TrimmedSurface face = untrimmed(rebuild(AffinePatch{{0, 0, 0}, {side, 0, 0}, {0, side, 0}}, knots, knots));
   face.name = "front";
-  face.surface = rebuild(AffinePatch{{0, 0, 0}, {side, 0, 0}, {0, side, 0}}, knots, knots);
   face.metres_per_unit = metres_per_unit;
-  face.loops.push_back(natural_loop(face.surface));
+  face.natural_bounds = !hole;
   if (hole) {
     TrimLoop loop;
     loop.kind = LoopKind::hole;
@@ -33,8 +32,6 @@ PanelFile flat_panel(bool hole, double metres_per_unit = 1) {
       loop.curves.push_back({circular_arc({0.47, 0.52}, radius, pi * k, pi * (k + 1)), k, false, {}});
     }
     face.loops.push_back(std::move(loop));
-  } else {
-    face.natural_bounds = true;
   }
   PanelFile file;
   file.path = "panel.igs";

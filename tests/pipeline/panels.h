@@ -32,13 +32,10 @@ class Folder {
 
 // 0.4 m x 0.4 m in millimetres, degree 2 on 5 x 5 spans.
 inline TrimmedSurface sheet(const std::string& name) {
-  TrimmedSurface face;
-  face.name = name;
   const AffinePatch plane{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0};
-  face.surface = rebuild(plane, uniform_knots(2, 5, {0, 400}), uniform_knots(2, 5, {0, 400}));
+  TrimmedSurface face = untrimmed(rebuild(plane, uniform_knots(2, 5, {0, 400}), uniform_knots(2, 5, {0, 400})));
+  face.name = name;
   face.metres_per_unit = 1e-3;
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
   return face;
 }
 

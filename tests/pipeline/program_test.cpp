@@ -246,6 +246,15 @@ TEST(Program, AnUnmetLimitIsExit6) {
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "result/report.json"))["exit"], "check");
 }
 
+TEST(Program, StrainBetweenThePointsOfTheLimitIsTold) {
+  const Small folder("between");
+  const std::string run = "drape scene.toml -o result --overwrite --set output.preview=false";
+  EXPECT_EQ(toile(folder, run).err.find("between the points"), std::string::npos);
+  const Outcome pulled = toile(folder, run + " --set 'traction=[{ along = \"curve:0,0\", force = [4, 0, 0] }]'");
+  EXPECT_EQ(pulled.code, 0) << pulled.err;
+  EXPECT_NE(pulled.err.find("between the points that hold the limit of 0.01"), std::string::npos) << pulled.err;
+}
+
 // Long enough to be stopped on the way, with frames of every format.
 const std::string long_run =
     "drape scene.toml --set 'output.formats=[\"vtu\", \"obj\", \"iges\"]' --set output.every=0.25 --until 2";

@@ -109,6 +109,7 @@ TEST(Scene, ValuesOutOfRangeNameLineAndKey) {
   EXPECT_NE(refusal(11, "mode = \"band\"\ncompress = [0.1, 10]").find("must be at most 0.5"), std::string::npos);
   EXPECT_NE(refusal(14, "[load]\ngravity = [0, 0, -1e300]\n[solver]").find("must be below"), std::string::npos);
   expect_message(15, "until = -1", {"until", "must be positive"});
+  EXPECT_NE(refusal(15, "until = 0.6\ndt = 1e-17").find("million steps"), std::string::npos);
   expect_message(9, "bending = { b0 = 1e-4, kappa0 = 30, kappa_reg = 31 }", {"kappa_reg", "must not exceed kappa0"});
   expect_message(6, "refine = { degree = 1 }", {"degree in refine is 1, must be 2 to 5"});
   expect_message(6, "refine = { span = 0.1, spans = [3, 3] }", {"one of span, spans and control_points"});

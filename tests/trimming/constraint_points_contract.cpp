@@ -10,9 +10,7 @@ std::vector<ConstraintPoint> points_of(TrimmedSurface& face) {
 }
 
 TEST(ConstraintPoints, AFaceWithoutATrimHasAllItsVertices) {
-  TrimmedSurface face = trimmed(unit_cells(8), {});
-  face.loops = {natural_loop(face.surface)};
-  face.natural_bounds = true;
+  TrimmedSurface face = untrimmed(unit_cells(8));
   const auto points = points_of(face);
   EXPECT_EQ(points.size(), 81u);
   for (const ConstraintPoint& p : points) EXPECT_EQ(p.kind, PointKind::vertex);

@@ -142,11 +142,9 @@ TEST(PanelMeasure, AFaceWithAPoleIsMeasuredAtOnce) {
   // A triangle with sides 1, 1 and sqrt(2), its edge v = 1 drawn together in one point that is no exact double.
   Eigen::Matrix3Xd points(3, 4);
   points << 0.3, 1.3, 0.3, 0.3, 0.7, 0.7, 1.7, 1.7, 0.1, 0.1, 0.1, 0.1;
-  TrimmedSurface face;
   const KnotVector line = uniform_knots(1, 1);
-  face.surface = NurbsSurface(line, line, points, {1, 0.7, 1.3, 0.9});
-  face.surface = elevate_degree(elevate_degree(face.surface, Direction::u, 3), Direction::v, 3);
-  face.loops = {natural_loop(face.surface)};
+  const NurbsSurface bilinear(line, line, points, {1, 0.7, 1.3, 0.9});
+  const TrimmedSurface face = untrimmed(elevate_degree(elevate_degree(bilinear, Direction::u, 3), Direction::v, 3));
   const PanelMeasure measured = measure(face, trace_trims(face));
   EXPECT_NEAR(measured.area, 0.5, 1e-9);
   EXPECT_NEAR(measured.loop_lengths.at(0), 2 + std::sqrt(2.0), 1e-9);

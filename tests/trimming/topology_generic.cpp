@@ -5,8 +5,7 @@ namespace toile::test {
 namespace {
 
 TEST(TrimTopology, UntrimmedFaceIsAllInside) {
-  TrimmedSurface face = trimmed(unit_cells(4), {});
-  face.loops = {natural_loop(face.surface)};
+  TrimmedSurface face = untrimmed(unit_cells(4));
   expect_tally(face, {.crossing_uv = 16, .inside = 16, .vertices = 9});
 }
 

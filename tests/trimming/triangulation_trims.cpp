@@ -98,11 +98,9 @@ TEST(Triangulation, PolygonsWithHolesAreCoveredExactly) {
 
 // Size and angles are those of the surface, not of its parameters: a strip 3 m x 0.5 m over [0, 1]^2, slanted.
 TEST(Triangulation, AffinePanelsAreMeshedInTheirOwnPlane) {
-  TrimmedSurface face = trimmed(knot_plane({0, 1}, {0, 1}), {});
   Eigen::Matrix3Xd net(3, 4);
   net << 0, 3, 0.4, 3.4, 0, 0, 0.3, 0.3, 0, 0, 0, 0;
-  face.surface = face.surface.with_points(net);
-  face.loops = {natural_loop(face.surface)};
+  const TrimmedSurface face = untrimmed(knot_plane({0, 1}, {0, 1}).with_points(net));
   const TrimmedTriangles mesh = mesh_of(face, {.size = 0.05, .given = {}});
   EXPECT_GT(mesh.quality.smallest_angle, 20 * degree);
   EXPECT_LT(mesh.quality.longest_edge, 0.07);
@@ -132,8 +130,7 @@ TEST(Triangulation, AHeavyWeightTakesNoMoreTrianglesThanItsSeam) {
   const auto count = [&](double weight) {
     std::vector<double> weights(static_cast<std::size_t>(n * n), 1);
     weights[static_cast<std::size_t>(n / 2 * (n + 1))] = weight;
-    TrimmedSurface face = trimmed(NurbsSurface(knots, knots, net, weights), {});
-    face.loops = {natural_loop(face.surface)};
+    const TrimmedSurface face = untrimmed(NurbsSurface(knots, knots, net, weights));
     return static_cast<double>(mesh_of(face, {}).triangles.size());
   };
   const double plain = count(1);
