@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "analysis/extension.h"
 #include "analysis/projection/averaged_rows.h"
+#include "geometry/clock.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "geometry/refine.h"
@@ -17,11 +17,6 @@
 
 namespace toile {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 std::string face_names(const PanelFile& file) {
   std::string names;

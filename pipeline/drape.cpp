@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "geometry/clock.h"
 #include "geometry/error.h"
 #include "io/file.h"
 #include "pipeline/build.h"
@@ -22,11 +22,6 @@
 
 namespace toile {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Of wall time between checkpoints; the promise is two seconds.
 constexpr double checkpoint_seconds = 1;

@@ -3,19 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "geometry/clock.h"
 #include "geometry/error.h"
 
 namespace toile {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 constexpr double step_safety = 0.9;   // of the eigenvalue bound
 constexpr int steps_per_bound = 100;  // the bound costs some 40 forces

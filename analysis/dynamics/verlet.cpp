@@ -1,17 +1,14 @@
 #include "analysis/dynamics/verlet.h"
 
-#include <chrono>
 #include <cmath>
 #include <utility>
+
+#include "geometry/clock.h"
 
 namespace toile {
 namespace {
 
 using Vector = Eigen::VectorXd;
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // f_int + f_ext on control points.
 ShellEnergy total_force(const DynamicSystem& system, const Vector& q, Vector& f) {
@@ -106,11 +103,11 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
   next.x = work.candidate;
   report.projection.converged = true;
   if (system.projection) {
-    const auto start = std::chrono::steady_clock::now();
+    const Clock::time_point start = Clock::now();
     next.constraint = state.constraint;
     report.projection = system.projection->step(next.x, next.t, state.x, dt, next.constraint);
     report.limit_energy = report.projection.energy;
-    report.projection_seconds = seconds_since(start);
+    report.projection_seconds = since(start);
   }
   work.move = next.x - state.x;
   work.constraint = (next.x - work.candidate) / (dt * dt);
@@ -120,9 +117,9 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
   next.q.resize(3 * system.map->control_points());
   system.map->fixed_places(next.t, work.fixed_places);
   system.map->expand(next.x, work.fixed_places, next.q);
-  const auto start = std::chrono::steady_clock::now();
+  const Clock::time_point start = Clock::now();
   report.elastic = total_force(system, next.q, next.f);
-  report.force_seconds = seconds_since(start);
+  report.force_seconds = since(start);
   acceleration(system, next.f, v_half, work.constraint, 0.5 * dt, next.a);
 
   report.load_work = system.loads.force.dot(next.q - state.q);

@@ -13,8 +13,9 @@
 namespace toile {
 namespace {
 
-// Below this many rows the envelope factor below is faster than CHOLMOD (README, "Constraints").
-constexpr int envelope_rows = 1000;
+// An envelope whose rows are longer than this in mean square is slower than CHOLMOD (README, "Factor"): a square of
+// some 1,000 rows, a strip or several panels of any size.
+constexpr double longest_rows = 3500;
 
 // One thread in BLAS and none of OpenMP's in CHOLMOD, which asks for four in each factorisation and waits for them
 // longer than it computes.
@@ -74,27 +75,43 @@ std::vector<int> reverse_cuthill_mckee(const SparsePattern& pattern) {
   return order;
 }
 
-// Rows of the lower factor from their first nonzero to the diagonal, contiguous: short dot products without
-// indirection, which is what small systems of narrow band want.
-class Envelope {
- public:
-  explicit Envelope(const SparsePattern& pattern) : order_(reverse_cuthill_mckee(pattern)) {
+// Where each row of the lower factor begins, in an order that keeps rows short.
+struct EnvelopeShape {
+  std::vector<int> order, place, first;  // order[k] is the row that stands k-th, place its inverse
+
+  explicit EnvelopeShape(const SparsePattern& pattern) : order(reverse_cuthill_mckee(pattern)) {
     const int n = pattern.size();
-    std::vector<int> place(n);
-    for (int k = 0; k < n; ++k) place[order_[k]] = k;
-    first_.resize(n);
-    for (int k = 0; k < n; ++k) first_[k] = k;
+    place.resize(n);
+    for (int k = 0; k < n; ++k) place[order[k]] = k;
+    first.resize(n);
+    for (int k = 0; k < n; ++k) first[k] = k;
     for (int c = 0; c < n; ++c)
       for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
         const auto [lo, hi] = std::minmax(place[c], place[pattern.row[e]]);
-        first_[hi] = std::min(first_[hi], lo);
+        first[hi] = std::min(first[hi], lo);
       }
+  }
+  int length(int k) const { return k - first[k] + 1; }
+  double mean_square_length() const {
+    double sum = 0;
+    for (std::size_t k = 0; k < first.size(); ++k) sum += std::pow(length(static_cast<int>(k)), 2);
+    return first.empty() ? 0 : sum / static_cast<double>(first.size());
+  }
+};
+
+// Rows of the lower factor from their first nonzero to the diagonal, contiguous: short dot products without
+// indirection, which is what systems of narrow band want.
+class Envelope {
+ public:
+  Envelope(const SparsePattern& pattern, EnvelopeShape shape)
+      : order_(std::move(shape.order)), first_(std::move(shape.first)) {
+    const int n = pattern.size();
     start_.resize(n + 1, 0);
     for (int k = 0; k < n; ++k) start_[k + 1] = start_[k] + (k - first_[k] + 1);
     slot_.resize(pattern.row.size());
     for (int c = 0; c < n; ++c)
       for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
-        const auto [lo, hi] = std::minmax(place[c], place[pattern.row[e]]);
+        const auto [lo, hi] = std::minmax(shape.place[c], shape.place[pattern.row[e]]);
         slot_[e] = start_[hi] + lo - first_[hi];
       }
     factor_.resize(start_[n]);
@@ -243,8 +260,8 @@ struct Cholesky::Impl {
 
 Cholesky::Cholesky(SparsePattern pattern) : impl_(std::make_unique<Impl>()) {
   impl_->values = pattern.row.size();
-  if (pattern.size() < envelope_rows)
-    impl_->envelope = std::make_unique<Envelope>(pattern);
+  if (EnvelopeShape shape(pattern); shape.mean_square_length() <= longest_rows)
+    impl_->envelope = std::make_unique<Envelope>(pattern, std::move(shape));
   else
     impl_->cholmod = std::make_unique<Cholmod>(std::move(pattern));
 }

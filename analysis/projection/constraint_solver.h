@@ -21,6 +21,7 @@ struct ProjectionReport {
   int worst_row = -1;   // strain row with the largest violation
   double energy = 0;    // J, of the limit laws at the end
   double factor_seconds = 0;  // wall time of the numeric factorisations
+  double solve_seconds = 0;   // and of the solutions by them
 };
 
 // Constraint forces of the steps before: what the next step needs to be of second order. Empty where there were none.

@@ -1,7 +1,6 @@
 #include "analysis/projection/fast_projection.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "analysis/linear/cholesky.h"
 #include "analysis/projection/composed_rows.h"
+#include "geometry/clock.h"
 #include "geometry/error.h"
 
 namespace toile {
@@ -82,7 +82,7 @@ struct FastProjection::Impl {
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void point_along(const Eigen::Matrix3Xd& tangents);
   bool factorise(ProjectionReport& report);
-  void correct(Eigen::Ref<Eigen::VectorXd> x);
+  void correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   void push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x);
   // Where the rows point while iterating: as they do, giving up where that gains nothing; along the candidate's
   // gradients, renewed where that gains nothing; or along those of each iteration.
@@ -236,9 +236,9 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
       if (i < strains() && soft(i)) softness = std::max(softness, law(i).slope(strain_lambda[i]) * scale[i] * scale[i]);
       values[pattern.column_start[i]] = 1 + softness;
     }
-    const auto start = std::chrono::steady_clock::now();
+    const Clock::time_point start = Clock::now();
     const bool positive = factor->factorise(values);
-    report.factor_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report.factor_seconds += since(start);
     if (positive) return true;
     strain_softness = std::max(10 * strain_softness, 1e-8);
     place_softness = std::max(10 * place_softness, 1e-10);
@@ -267,9 +267,11 @@ void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen
     place_lambda((i - strains()) % 3, (i - strains()) / 3) += scale[i] * amounts[i];
 }
 
-void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
+void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report) {
   rhs = scale.cwiseProduct(residual);
+  const Clock::time_point start = Clock::now();
   factor->solve(rhs, solution);
+  report.solve_seconds += since(start);
   // A row with slack can't change sides within an iteration: it lets go first.
   for (int r = 0; r < strains(); ++r)
     if (soft(r) && band(r).slack > 0) {
@@ -308,7 +310,7 @@ ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, Di
       factored = true;
     }
     last = excess;
-    correct(x);
+    correct(x, report);
     ++report.iterations;
   }
   report.energy = limit_energy();
@@ -345,22 +347,21 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
     if (s.has_law(r) && s.rows.strain[r].damping_rate > 0)
       s.exactness = std::clamp(s.rows.strain[r].damping_rate * dt, least_exactness, s.exactness);
   s.candidate = x;
-  // What the steps before are owed, and as a first guess that the forces stay as they are.
+  // What the steps before are owed, and as a first guess that the forces stay as they are. Multipliers are what the
+  // end of the step adds.
+  s.rhs.setZero();
   for (int r = 0; r < s.strains(); ++r) {
-    s.rhs[r] = 0;
     if (!s.has_law(r)) continue;
-    const Eigen::Vector4d weights = force_weights(std::min(1.0, dt * s.rows.strain[r].damping_rate));
+    Eigen::Vector4d weights = force_weights(std::min(1.0, dt * s.rows.strain[r].damping_rate));
     s.share[r] = weights[0];
     s.compliance[r] = 1 / (s.share[r] * s.rows.strain[r].stiffness * dt2);
+    weights[1] += weights[0];
     s.rhs[r] = dt2 * weights.tail<3>().dot(forces.strain.col(r)) / s.scale[r];
   }
-  s.rhs.tail(3 * s.places()).setZero();
-  s.push(s.rhs, x);
-  s.strain_lambda.setZero();
-  for (int r = 0; r < s.strains(); ++r) s.rhs[r] = s.soft(r) ? s.share[r] * dt2 * forces.strain(0, r) / s.scale[r] : 0;
   for (int i = s.strains(); i < s.size(); ++i)
     s.rhs[i] = dt2 * forces.place((i - s.strains()) % 3, (i - s.strains()) / 3) / s.scale[i];
   s.push(s.rhs, x);
+  for (int r = 0; r < s.strains(); ++r) s.strain_lambda[r] = s.soft(r) ? s.share[r] * dt2 * forces.strain(0, r) : 0;
   ProjectionReport report = s.iterate(x, Impl::Directions::start);
   if (!report.converged || report.residual > s.exactness * s.options.residual) {
     // From no force on.
@@ -370,11 +371,13 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
     s.share.setOnes();
     const ProjectionReport again = s.iterate(x, Impl::Directions::candidate);
     const int iterations = report.iterations + again.iterations;
-    const double seconds = report.factor_seconds + again.factor_seconds;
+    const double factor_seconds = report.factor_seconds + again.factor_seconds;
+    const double solve_seconds = report.solve_seconds + again.solve_seconds;
     report = again;
     report.damped = true;
     report.iterations = iterations;
-    report.factor_seconds = seconds;
+    report.factor_seconds = factor_seconds;
+    report.solve_seconds = solve_seconds;
   }
   s.strain_lambda = s.strain_lambda.cwiseQuotient(s.share);
   forces.strain.row(2) = forces.strain.row(1);

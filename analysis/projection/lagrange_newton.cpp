@@ -1,7 +1,6 @@
 #include "analysis/projection/lagrange_newton.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "analysis/linear/cholesky.h"
 #include "analysis/projection/composed_rows.h"
+#include "geometry/clock.h"
 #include "geometry/error.h"
 
 namespace toile {
@@ -138,7 +138,7 @@ struct LagrangeNewton::Impl {
   void balance(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void assemble(bool compression);
   bool factorise(ProjectionReport& report);
-  void correct(Eigen::Ref<Eigen::VectorXd> x);
+  void correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   void project(Eigen::Ref<Eigen::VectorXd> x, double t, ProjectionReport& report);
 };
 
@@ -215,21 +215,23 @@ bool LagrangeNewton::Impl::factorise(ProjectionReport& report) {
   for (int attempt = 0; attempt < 5; ++attempt) {
     if (attempt > 1) softness *= 10;
     assemble(attempt == 0);
-    const auto start = std::chrono::steady_clock::now();
+    const Clock::time_point start = Clock::now();
     const bool positive = factor->factorise(values);
-    report.factor_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report.factor_seconds += since(start);
     if (positive) return true;
   }
   return false;
 }
 
-void LagrangeNewton::Impl::correct(Eigen::Ref<Eigen::VectorXd> x) {
+void LagrangeNewton::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report) {
   missed = strain - softness.head(strains()).cwiseProduct(lambda() - anchor);
   rhs = -force;
   for (int r = 0; r < strains(); ++r)
     if (gram_diagonal[r] > 0) spread(r, -missed[r] / softness[r] * y.col(r), rhs);
   for (int p = 0; p < places(); ++p) spread(strains() + p, -gap.col(p) / softness[strains() + p], rhs);
+  const Clock::time_point start = Clock::now();
   factor->solve(rhs, solution);
+  report.solve_seconds += since(start);
   x += solution;
   for (int r = 0; r < strains(); ++r)
     if (gram_diagonal[r] > 0) lambda()[r] += (missed[r] + y.col(r).dot(gather(r, solution))) / softness[r];
@@ -244,11 +246,13 @@ void LagrangeNewton::Impl::project(Eigen::Ref<Eigen::VectorXd> x, double t, Proj
   const ProjectionReport instead = projection->project(x, t);
   memory = projection->memory();
   const int iterations = report.iterations + instead.iterations;
-  const double seconds = report.factor_seconds + instead.factor_seconds, residual = report.residual;
+  const double factor_seconds = report.factor_seconds + instead.factor_seconds;
+  const double solve_seconds = report.solve_seconds + instead.solve_seconds, residual = report.residual;
   report = instead;
   report.damped = true;
   report.iterations = iterations;
-  report.factor_seconds = seconds;
+  report.factor_seconds = factor_seconds;
+  report.solve_seconds = solve_seconds;
   report.residual = residual;
 }
 
@@ -286,7 +290,7 @@ ProjectionReport LagrangeNewton::project(Eigen::Ref<Eigen::VectorXd> x, double t
       s.project(x, t, report);
       return report;
     }
-    s.correct(x);
+    s.correct(x, report);
     ++report.iterations;
   }
   for (int r = 0; r < s.strains(); ++r) s.memory.strain_impulses.col(r) = s.lambda()[r] * s.y.col(r);

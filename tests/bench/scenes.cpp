@@ -1,10 +1,10 @@
 #include "bench/scenes.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <string>
 
+#include "geometry/clock.h"
 #include "pipeline/measures.h"
 #include "pipeline/run.h"
 
@@ -64,25 +64,30 @@ StepCost step_cost(const std::filesystem::path& samples, int per_direction) {
   DynamicState state = state_from(*system, scene.start, still, 0);
   initialise(system->dynamic, state);
   const DynamicState start = state;
-  std::vector<double> motion, projection, factorisation;
+  std::vector<double> motion, projection, solution, factorisation;
   double spent = 0;
   for (int k = 0; k < least_steps || spent < least_seconds; ++k) {
     const StepReport report = step(system->dynamic, state, dt);
     const double iterations = report.projection.iterations;
     spent += report.projection_seconds;
-    projection.push_back((report.projection_seconds - report.projection.factor_seconds) / iterations);
-    factorisation.push_back(report.projection.factor_seconds / iterations);
+    const double factor = report.projection.factor_seconds, solve = report.projection.solve_seconds;
+    projection.push_back((report.projection_seconds - factor - solve) / iterations);
+    solution.push_back(solve / iterations);
+    factorisation.push_back(factor / iterations);
   }
   cost.projection = median(projection);
+  cost.solution = median(solution);
   cost.factorisation = median(factorisation);
+  cost.fill =
+      static_cast<double>(system->projection->factor_nonzeros()) / (system->strain_rows + 3 * system->place_rows);
 
   DynamicSystem free = system->dynamic;
   free.projection = nullptr;
   state = start;
   for (spent = 0; static_cast<int>(motion.size()) < least_steps || spent < least_seconds; spent += motion.back()) {
-    const auto begin = std::chrono::steady_clock::now();
+    const Clock::time_point begin = Clock::now();
     step(free, state, dt);
-    motion.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    motion.push_back(since(begin));
   }
   cost.motion = median(motion);
   return cost;

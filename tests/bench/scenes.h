@@ -22,8 +22,10 @@ struct StepCost {
   int control_points = 0;
   std::size_t quadrature_points = 0;
   double motion = 0;         // s, a step without projection
-  double projection = 0;     // s, one iteration of the projection without the numeric factorisation
+  double projection = 0;     // s, one iteration of the projection without its linear system: rows, matrix, correction
+  double solution = 0;       // s, of one iteration by the factor: two triangular solves
   double factorisation = 0;  // s, of one iteration
+  double fill = 0;           // nonzeros of the factor per row
 };
 StepCost step_cost(const std::filesystem::path& samples, int per_direction);
 
