@@ -125,9 +125,11 @@ class Parser {
 
   Value factor() {
     if (peek() == '(') {
+      if (++depth_ > deepest) fail("its brackets are nested too deeply");
       ++position_;
       const Value inner = product(true);
       ++position_;
+      --depth_;
       return inner;
     }
     if (peek() == '1') {
@@ -156,8 +158,10 @@ class Parser {
     return {std::pow(unit->factor, power), {d.length * power, d.mass * power, d.time * power, d.angle * power}};
   }
 
+  static constexpr int deepest = 8;
   std::string_view text_;
   std::size_t position_ = 0;
+  int depth_ = 0;
 };
 
 }  // namespace

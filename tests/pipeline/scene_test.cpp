@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geometry/error.h"
+#include "io/file.h"
 #include "support/near.h"
 
 namespace toile {
@@ -260,6 +261,18 @@ TEST(Address, OthersAreRefused) {
                            "corners:0,0"}) {
     EXPECT_THROW(parse_address(text), InputError) << text;
   }
+}
+
+// What tests/fuzz/run found; the name says what it was.
+TEST(Scene, FindingsOfTheFuzzerStayFixed) {
+  int read = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::filesystem::path(TOILE_TEST_DATA) / "fuzz" / "scene")) {
+    SCOPED_TRACE(entry.path().filename().string());
+    EXPECT_THROW(parse_scene(read_file(entry.path()), scene_path), InputError);
+    ++read;
+  }
+  EXPECT_GE(read, 1);
 }
 
 }  // namespace

@@ -59,6 +59,11 @@ TEST(Units, NonsenseIsRefused) {
   }
 }
 
+TEST(Units, DeepNestingIsRefused) {
+  EXPECT_EQ(parse_quantity("2 ((((mm))))", dimension::length), 0.002);
+  EXPECT_NE(refusal("2 " + std::string(100'000, '(') + "m", dimension::length).find("nested"), std::string::npos);
+}
+
 TEST(Units, DegreesShowNoRoundingErrors) {
   EXPECT_EQ(degrees_text(-1e-17), "0");
   EXPECT_EQ(degrees_text(std::atan2(1, -1e-16)), "90");

@@ -972,7 +972,8 @@ std::string text_of(const TrimCase& given) {
     }
     return out + "}";
   };
-  std::string out = "{\"" + given.family + "\", " + list(given.u) + ", " + list(given.v) + ", {";
+  std::string out = "{\"";
+  out += given.family + "\", " + list(given.u) + ", " + list(given.v) + ", {";
   for (const ExactLoop& loop : given.loops) {
     out += "\n  {";
     for (const ExactPiece& p : loop) out += "{" + list(p.u) + ", " + list(p.v) + ", " + list(p.w) + "},\n   ";
