@@ -87,7 +87,7 @@ IgesOutput draped_file(const Build& build, const Eigen::VectorXd& q) {
 struct FrameWriter::Impl {
   const Build& build;
   std::filesystem::path frames;
-  std::vector<TrimmedTriangles> triangles;
+  std::vector<TrimmedTriangles> triangles;  // made when they are first shown
   std::vector<std::unique_ptr<FrameSink>> sinks;
   bool iges = false;
 
@@ -116,8 +116,11 @@ struct FrameWriter::Impl {
     return raw;
   }
 
-  Shown show(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd* velocity, double dt) const {
+  Shown show(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd* velocity, double dt) {
     Shown shown;
+    if (triangles.empty()) {
+      for (const BuiltPanel& panel : build.panels) triangles.push_back(triangulate(panel.face, panel.topology));
+    }
     shown.surfaces.reserve(build.panels.size());
     const ShellModel& model = *build.model;
     for (std::size_t k = 0; k < build.panels.size(); ++k) {
@@ -171,7 +174,6 @@ struct FrameWriter::Impl {
 
 FrameWriter::FrameWriter(const Build& build, std::filesystem::path directory, const std::vector<double>& written)
     : impl_(new Impl{build, std::move(directory) / "frames", {}, {}, false}) {
-  for (const BuiltPanel& panel : build.panels) impl_->triangles.push_back(triangulate(panel.face, panel.topology));
   for (const FrameFormat format : build.scene.formats) {
     switch (format) {
       case FrameFormat::vtu:

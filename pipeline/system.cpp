@@ -311,6 +311,7 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
       system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
     else
       system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
+    system->projection->use_threads(build.model->workers());
   }
   dynamic.projection = system->projection.get();
   return system;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "geometry/error.h"
@@ -154,6 +155,14 @@ class Envelope {
   }
 
   std::size_t nonzeros() const { return factor_.size(); }
+  double operations() const {
+    double sum = 0;
+    for (int i = 0; i < static_cast<int>(first_.size()); ++i) {
+      for (int j = first_[i]; j < i; ++j) sum += 2 * (j - std::max(first_[i], first_[j])) + 4;
+      sum += 2;
+    }
+    return sum;
+  }
 
  private:
   // Four partial sums in a fixed order: vectorises, and gives the same bits whatever the alignment.
@@ -241,6 +250,10 @@ class Cholmod {
     for (std::size_t c = 0; c < factor_->n; ++c) sum += static_cast<std::size_t>(counts[c]);
     return sum;
   }
+  double operations() const {
+    const auto* counts = static_cast<const int*>(factor_->ColCount);
+    return std::accumulate(counts, counts + factor_->n, 0.0, [](double sum, double count) { return sum + count * count; });
+  }
 
  private:
   SparsePattern pattern_;
@@ -280,6 +293,10 @@ void Cholesky::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Ei
 
 std::size_t Cholesky::factor_nonzeros() const {
   return impl_->envelope ? impl_->envelope->nonzeros() : impl_->cholmod->nonzeros();
+}
+
+double Cholesky::factor_operations() const {
+  return impl_->envelope ? impl_->envelope->operations() : impl_->cholmod->operations();
 }
 
 }  // namespace toile

@@ -25,6 +25,7 @@ class Cholesky {
   bool factorise(std::span<const double> values);
   void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) const;
   std::size_t factor_nonzeros() const;
+  double factor_operations() const;  // floating-point, of one factorisation
 
  private:
   struct Impl;

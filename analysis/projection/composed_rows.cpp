@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 
 namespace toile {
 namespace {
@@ -38,9 +39,9 @@ ComposedRows compose(const AffineMap& map, const ConstraintRows& rows) {
 }
 
 void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>& x,
-              const Eigen::Matrix3Xd& fixed_places, Eigen::Matrix3Xd& y) {
+              const Eigen::Matrix3Xd& fixed_places, int begin, int end, Eigen::Matrix3Xd& y) {
   const double* places = x.data();
-  for (int r = 0; r < rows.free.size(); ++r) {
+  for (int r = begin; r < end; ++r) {
     double s0 = 0, s1 = 0, s2 = 0;
     for (int e = rows.free.start[r]; e < rows.free.start[r + 1]; ++e) {
       const double* p = places + 3 * rows.free.column[e];
@@ -55,6 +56,23 @@ void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>&
     double* out = y.data() + 3 * r;
     out[0] = s0, out[1] = s1, out[2] = s2;
   }
+}
+
+CompressedRows transposed_by_mass(const CompressedRows& rows, const Eigen::VectorXd& node_mass) {
+  CompressedRows out;
+  out.start.assign(static_cast<std::size_t>(node_mass.size()) + 1, 0);
+  for (int k : rows.column) ++out.start[k + 1];
+  std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
+  out.column.resize(rows.column.size());
+  out.value.resize(rows.value.size());
+  std::vector<int> next(out.start.begin(), out.start.end() - 1);
+  for (int r = 0; r < rows.size(); ++r)
+    for (int e = rows.start[r]; e < rows.start[r + 1]; ++e) {
+      const int slot = next[rows.column[e]]++;
+      out.column[slot] = r;
+      out.value[slot] = rows.value[e] / node_mass[rows.column[e]];
+    }
+  return out;
 }
 
 GramMatrix gram_matrix(const CompressedRows& rows, const Eigen::VectorXd& node_mass) {

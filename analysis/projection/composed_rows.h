@@ -23,9 +23,16 @@ struct ComposedRows {
 };
 ComposedRows compose(const AffineMap& map, const ConstraintRows& rows);
 
-// y_r = sum over nodes and fixed control points; column r.
+// y_r = sum over nodes and fixed control points; columns r of [begin, end).
 void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>& x,
-              const Eigen::Matrix3Xd& fixed_places, Eigen::Matrix3Xd& y);
+              const Eigen::Matrix3Xd& fixed_places, int begin, int end, Eigen::Matrix3Xd& y);
+inline void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::VectorXd>& x,
+                     const Eigen::Matrix3Xd& fixed_places, Eigen::Matrix3Xd& y) {
+  evaluate(rows, x, fixed_places, 0, rows.free.size(), y);
+}
+
+// Per node the rows that reach it, ascending, each divided by the node's mass: M^-1 D^T.
+CompressedRows transposed_by_mass(const CompressedRows& rows, const Eigen::VectorXd& node_mass);
 
 // Lower triangle of D M^-1 D^T over scalar rows, which never changes: the scalar part of J M^-1 J^T.
 struct GramMatrix {

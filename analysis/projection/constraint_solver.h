@@ -3,10 +3,13 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <memory>
 
 #include "analysis/projection/constraint_rows.h"
 
 namespace toile {
+
+class Workers;
 
 struct ProjectionReport {
   bool converged = false;  // <=> strain_violation <= tolerance and place_violation <= place_tolerance
@@ -64,6 +67,9 @@ class ConstraintSolver {
   // All three, and putting them back where a run is taken up again; false where their sizes are of other rows.
   virtual ProjectionMemory memory() const = 0;
   virtual bool restore(const ProjectionMemory& memory) = 0;
+
+  // Steps by these threads from now on: the same bits. Null: the caller's alone, which is all that some solvers use.
+  virtual void use_threads(std::shared_ptr<Workers> workers) { (void)workers; }
 
   virtual const ConstraintRows& rows() const = 0;
   virtual std::size_t factor_nonzeros() const = 0;

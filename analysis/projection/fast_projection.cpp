@@ -8,6 +8,7 @@
 
 #include "analysis/linear/cholesky.h"
 #include "analysis/projection/composed_rows.h"
+#include "analysis/workers.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
 
@@ -31,6 +32,15 @@ Eigen::Vector4d force_weights(double damping) {
 
 }  // namespace
 
+// The worst of some strain rows.
+struct Violation {
+  double violation = 0, residual = 0;
+  int row = -1;
+  void take(double v, int r) {
+    if (!(v <= violation) && !std::isnan(violation)) violation = v, row = r;  // NaN counts as worst
+  }
+};
+
 // System rows: one per strain row, then three (x, y, z) per place row. Row i of J is (row of D) x direction_i: a
 // tangent for strain rows, a unit vector for place rows; hence
 // (J M^-1 J^T)_ij = (D M^-1 D^T)_ij (direction_i . direction_j), whose first factor never changes.
@@ -39,12 +49,17 @@ struct FastProjection::Impl {
   ConstraintRows rows;
   ProjectionOptions options;
   ComposedRows composed;
-  std::vector<double> weight;         // composed.free.value / node mass
+  CompressedRows at_node;             // M^-1 D^T
+  // Of `rows`, close together, as every iteration reads them.
+  std::vector<char> warp;
+  std::vector<double> stiffness, damping_rate;
+  double least_damping_rate = std::numeric_limits<double>::infinity();  // of rows with a law that damps
   std::vector<double> gram_diagonal;  // per scalar row; 0: takes no part
   std::vector<int> system_scalar;     // scalar row of each system row
   SparsePattern pattern;
   std::vector<double> gram, values;  // per entry of the pattern
   std::unique_ptr<Cholesky> factor;
+  std::shared_ptr<Workers> workers;  // null: one thread
 
   Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
   Eigen::VectorXd scale, residual, rhs, solution, candidate;
@@ -53,6 +68,9 @@ struct FastProjection::Impl {
   Eigen::VectorXd share;                      // of the force at the end in what acts in a step
   std::vector<char> slack;                    // within the band without a force: takes no part for now
   Eigen::Matrix3Xd place_lambda, strain_impulse;
+  Eigen::Matrix3Xd impulse;     // per scalar row, of one push
+  Eigen::VectorXd row_energy;   // per strain row
+  std::vector<Violation> parts;  // per thread
 
   Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
       : map(m), rows(std::move(r)), options(o), composed(compose(map, rows)) {}
@@ -60,19 +78,31 @@ struct FastProjection::Impl {
   int strains() const { return static_cast<int>(rows.strain.size()); }
   int places() const { return static_cast<int>(rows.place.size()); }
   int size() const { return strains() + 3 * places(); }
-  const StrainBand& band(int r) const { return rows.strain[r].warp ? options.warp : options.weft; }
+  const StrainBand& band(int r) const { return warp[r] ? options.warp : options.weft; }
   bool takes_part(int r) const { return gram_diagonal[r] > 0; }
-  bool has_law(int r) const { return takes_part(r) && rows.strain[r].stiffness > 0; }
+  bool has_law(int r) const { return takes_part(r) && stiffness[r] > 0; }
   bool soft(int r) const { return compliance[r] > 0; }
   LimitLaw law(int r) const { return {band(r), compliance[r]}; }
   // The law of a row in forces instead of a step's multipliers.
-  LimitLaw force_law(int r) const { return {band(r), 1 / rows.strain[r].stiffness}; }
+  LimitLaw force_law(int r) const { return {band(r), 1 / stiffness[r]}; }
   double strain(const Eigen::Matrix3Xd& tangent, int r) const { return 0.5 * (tangent.col(r).squaredNorm() - 1); }
-  double limit_energy() const {
+  double limit_energy() {
+    share_out(strains(), [&](int, int begin, int end) {
+      for (int r = begin; r < end; ++r) row_energy[r] = has_law(r) ? force_law(r).energy(strain(y, r)) : 0;
+    });
     double sum = 0;
-    for (int r = 0; r < strains(); ++r)
-      if (has_law(r)) sum += force_law(r).energy(strain(y, r));
+    for (const double energy : row_energy) sum += energy;
     return sum;
+  }
+
+  // body(part, begin, end) of [0, count), a run of it for each thread; what the bodies write must not depend on where the
+  // runs end.
+  template <class Body>
+  void share_out(int count, const Body& body) {
+    const int n = workers ? workers->count() : 1;
+    if (n == 1) return body(0, 0, count);
+    const auto at = [&](int part) { return static_cast<int>(static_cast<long>(count) * part / n); };
+    workers->run([&](int part) { body(part, at(part), at(part + 1)); });
   }
 
   void build(const Eigen::VectorXd& node_mass);
@@ -80,6 +110,7 @@ struct FastProjection::Impl {
   void clear();
   void complete(ConstraintForces& forces) const;
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
+  Violation measure_strain(int begin, int end);
   void point_along(const Eigen::Matrix3Xd& tangents);
   bool factorise(ProjectionReport& report);
   void correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
@@ -96,13 +127,19 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
     if (!(node_mass[k] > 0))
       throw SolverError("projection: control point " + std::to_string(map.node_control_point()[k]) + " has no mass");
 
-  weight = composed.free.value;
-  for (std::size_t e = 0; e < weight.size(); ++e) weight[e] /= node_mass[composed.free.column[e]];
+  at_node = transposed_by_mass(composed.free, node_mass);
+  for (const StrainRow& row : rows.strain) {
+    warp.push_back(row.warp);
+    stiffness.push_back(row.stiffness);
+    damping_rate.push_back(row.damping_rate);
+  }
 
   const GramMatrix scalar = gram_matrix(composed.free, node_mass);
   const int scalars = strains() + places();
   gram_diagonal.resize(scalars);
   for (int r = 0; r < scalars; ++r) gram_diagonal[r] = scalar.value[scalar.pattern.column_start[r]];
+  for (int r = 0; r < strains(); ++r)
+    if (has_law(r) && damping_rate[r] > 0) least_damping_rate = std::min(least_damping_rate, damping_rate[r]);
   for (int p = 0; p < places(); ++p)
     if (!(gram_diagonal[strains() + p] > 0))
       throw SolverError("pin " + std::to_string(rows.place[p].pin) +
@@ -145,6 +182,9 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   slack.assign(strains(), 0);
   place_lambda = Eigen::Matrix3Xd::Zero(3, places());
   strain_impulse = Eigen::Matrix3Xd::Zero(3, strains());
+  impulse.resize(3, scalars);
+  row_energy.resize(strains());
+  parts.resize(1);
 }
 
 void FastProjection::Impl::begin(double t) {
@@ -171,11 +211,10 @@ void FastProjection::Impl::complete(ConstraintForces& forces) const {
   if (forces.place.cols() != places()) forces.place.setZero(3, places());
 }
 
-void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
-  evaluate(composed, x, fixed_places, y);
-  report.strain_violation = report.place_violation = report.residual = report.energy = 0;
-  report.worst_row = -1;
-  for (int r = 0; r < strains(); ++r) {
+// Violation and residual of strain rows, at y.
+Violation FastProjection::Impl::measure_strain(int begin, int end) {
+  Violation worst;
+  for (int r = begin; r < end; ++r) {
     slack[r] = 0;
     residual[r] = 0;
     if (!takes_part(r)) continue;
@@ -188,13 +227,29 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
       slack[r] = b.slack > 0 && strain_lambda[r] == 0 && law(r).slack_at(C);
       const double lambda = strain_lambda[r] != 0 ? strain_lambda[r] : std::copysign(0.0, C);
       residual[r] = slack[r] ? 0 : C - law(r).strain(lambda);
-      report.residual = std::max(report.residual, std::abs(residual[r]) / std::min(b.stretch, b.compress));
+      worst.residual = std::max(worst.residual, std::abs(residual[r]) / std::min(b.stretch, b.compress));
     }
-    if (!(violation <= report.strain_violation) && !std::isnan(report.strain_violation)) {  // NaN counts as worst
-      report.strain_violation = violation;
-      report.worst_row = r;
-    }
+    worst.take(violation, r);
   }
+  return worst;
+}
+
+void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
+  std::fill(parts.begin(), parts.end(), Violation());
+  share_out(strains(), [&](int part, int begin, int end) {
+    evaluate(composed, x, fixed_places, begin, end, y);
+    parts[static_cast<std::size_t>(part)] = measure_strain(begin, end);
+  });
+  Violation worst;
+  for (const Violation& part : parts) {
+    worst.take(part.violation, part.row);
+    worst.residual = std::max(worst.residual, part.residual);
+  }
+  report.strain_violation = worst.violation;
+  report.worst_row = worst.row;
+  report.residual = worst.residual;
+  report.place_violation = report.energy = 0;
+  evaluate(composed, x, fixed_places, strains(), strains() + places(), y);
   for (int p = 0; p < places(); ++p) {
     const Eigen::Vector3d gap = y.col(strains() + p) - targets.col(p);
     residual.segment<3>(strains() + 3 * p) = gap;
@@ -205,11 +260,13 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
 }
 
 void FastProjection::Impl::point_along(const Eigen::Matrix3Xd& along) {
-  for (int r = 0; r < strains(); ++r) {
-    const double length = std::max(along.col(r).norm(), shortest_tangent);
-    scale[r] = takes_part(r) ? 1 / (std::sqrt(gram_diagonal[r]) * length) : 0;
-    direction.col(r) = scale[r] * along.col(r);
-  }
+  share_out(strains(), [&](int, int begin, int end) {
+    for (int r = begin; r < end; ++r) {
+      const double length = std::max(along.col(r).norm(), shortest_tangent);
+      scale[r] = takes_part(r) ? 1 / (std::sqrt(gram_diagonal[r]) * length) : 0;
+      direction.col(r) = scale[r] * along.col(r);
+    }
+  });
   for (int i = strains(); i < size(); ++i) {
     scale[i] = 1 / std::sqrt(gram_diagonal[system_scalar[i]]);
     direction.col(i) = scale[i] * Eigen::Vector3d::Unit((i - strains()) % 3);
@@ -218,24 +275,29 @@ void FastProjection::Impl::point_along(const Eigen::Matrix3Xd& along) {
 
 bool FastProjection::Impl::factorise(ProjectionReport& report) {
   const double* t = direction.data();
-  for (int c = 0; c < size(); ++c) {
-    const bool idle = c < strains() && slack[c];
-    const double t0 = t[3 * c], t1 = t[3 * c + 1], t2 = t[3 * c + 2];
-    for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
-      const int r = pattern.row[e];
-      const double* s = t + 3 * r;
-      values[e] = idle || (r < strains() && slack[r]) ? 0 : gram[e] * (s[0] * t0 + s[1] * t1 + s[2] * t2);
+  share_out(size(), [&](int, int begin, int end) {
+    for (int c = begin; c < end; ++c) {
+      const bool idle = c < strains() && slack[c];
+      const double t0 = t[3 * c], t1 = t[3 * c + 1], t2 = t[3 * c + 2];
+      for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
+        const int r = pattern.row[e];
+        const double* s = t + 3 * r;
+        values[e] = idle || (r < strains() && slack[r]) ? 0 : gram[e] * (s[0] * t0 + s[1] * t1 + s[2] * t2);
+      }
     }
-  }
+  });
   // Strain rows may depend on each other (an edge between two pins); place rows may not, and get no softness unless the
   // factor fails without it.
   double strain_softness = options.regularisation, place_softness = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
-    for (int i = 0; i < size(); ++i) {
-      double softness = i < strains() ? strain_softness : place_softness;
-      if (i < strains() && soft(i)) softness = std::max(softness, law(i).slope(strain_lambda[i]) * scale[i] * scale[i]);
-      values[pattern.column_start[i]] = 1 + softness;
-    }
+    share_out(size(), [&](int, int begin, int end) {
+      for (int i = begin; i < end; ++i) {
+        double softness = i < strains() ? strain_softness : place_softness;
+        if (i < strains() && soft(i))
+          softness = std::max(softness, law(i).slope(strain_lambda[i]) * scale[i] * scale[i]);
+        values[pattern.column_start[i]] = 1 + softness;
+      }
+    });
     const Clock::time_point start = Clock::now();
     const bool positive = factor->factorise(values);
     report.factor_seconds += since(start);
@@ -248,23 +310,31 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
 
 // x -= M^-1 J^T amounts, for amounts of scaled rows.
 void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x) {
-  double* places_of = x.data();
-  for (int i = 0; i < size(); ++i) {
-    const int r = system_scalar[i];
-    const double z = amounts[i];
-    if (z == 0) continue;
-    const double p0 = z * direction(0, i), p1 = z * direction(1, i), p2 = z * direction(2, i);
-    for (int e = composed.free.start[r]; e < composed.free.start[r + 1]; ++e) {
-      double* p = places_of + 3 * composed.free.column[e];
-      p[0] -= weight[e] * p0, p[1] -= weight[e] * p1, p[2] -= weight[e] * p2;
+  share_out(strains(), [&](int, int begin, int end) {
+    for (int r = begin; r < end; ++r) {
+      impulse.col(r) = amounts[r] * direction.col(r);
+      strain_lambda[r] += scale[r] * amounts[r];
+      strain_impulse.col(r) += impulse.col(r);
     }
+  });
+  for (int i = strains(); i < size(); ++i) {
+    const int p = (i - strains()) / 3, k = (i - strains()) % 3;
+    impulse(k, strains() + p) = amounts[i] * scale[i];
+    place_lambda(k, p) += impulse(k, strains() + p);
   }
-  for (int r = 0; r < strains(); ++r) {
-    strain_lambda[r] += scale[r] * amounts[r];
-    strain_impulse.col(r) += amounts[r] * direction.col(r);
-  }
-  for (int i = strains(); i < size(); ++i)
-    place_lambda((i - strains()) % 3, (i - strains()) / 3) += scale[i] * amounts[i];
+  // Node by node, so that a thread writes what no other does.
+  share_out(map.nodes(), [&](int, int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      double s0 = 0, s1 = 0, s2 = 0;
+      for (int e = at_node.start[k]; e < at_node.start[k + 1]; ++e) {
+        const double* of_row = impulse.data() + 3 * static_cast<std::ptrdiff_t>(at_node.column[e]);
+        const double w = at_node.value[e];
+        s0 += w * of_row[0], s1 += w * of_row[1], s2 += w * of_row[2];
+      }
+      double* place = x.data() + 3 * static_cast<std::ptrdiff_t>(k);
+      place[0] -= s0, place[1] -= s1, place[2] -= s2;
+    }
+  });
 }
 
 void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report) {
@@ -273,12 +343,14 @@ void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionRepo
   factor->solve(rhs, solution);
   report.solve_seconds += since(start);
   // A row with slack can't change sides within an iteration: it lets go first.
-  for (int r = 0; r < strains(); ++r)
-    if (soft(r) && band(r).slack > 0) {
-      const double after = strain_lambda[r] + scale[r] * solution[r];
-      const double side = strain_lambda[r] != 0 ? strain_lambda[r] : residual[r];
-      if (slack[r] || after * side < 0) solution[r] = scale[r] > 0 ? -strain_lambda[r] / scale[r] : 0;
-    }
+  if (options.weft.slack > 0 || options.warp.slack > 0) {
+    for (int r = 0; r < strains(); ++r)
+      if (soft(r) && band(r).slack > 0) {
+        const double after = strain_lambda[r] + scale[r] * solution[r];
+        const double side = strain_lambda[r] != 0 ? strain_lambda[r] : residual[r];
+        if (slack[r] || after * side < 0) solution[r] = scale[r] > 0 ? -strain_lambda[r] / scale[r] : 0;
+      }
+  }
   push(solution, x);
 }
 
@@ -337,31 +409,34 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   Impl& s = *impl_;
   if (s.options.variant == ProjectionVariant::paper) return project(x, t);
   s.map.fixed_places(t - dt, s.fixed_places);
-  evaluate(s.composed, start, s.fixed_places, s.tangents);
+  s.share_out(s.strains() + s.places(), [&](int, int begin, int end) {
+    evaluate(s.composed, start, s.fixed_places, begin, end, s.tangents);
+  });
   s.begin(t);
   s.point_along(s.tangents);
   s.complete(forces);
   const double dt2 = dt * dt;
-  s.exactness = 1;
-  for (int r = 0; r < s.strains(); ++r)
-    if (s.has_law(r) && s.rows.strain[r].damping_rate > 0)
-      s.exactness = std::clamp(s.rows.strain[r].damping_rate * dt, least_exactness, s.exactness);
+  s.exactness = std::clamp(s.least_damping_rate * dt, least_exactness, 1.0);
   s.candidate = x;
   // What the steps before are owed, and as a first guess that the forces stay as they are. Multipliers are what the
   // end of the step adds.
-  s.rhs.setZero();
-  for (int r = 0; r < s.strains(); ++r) {
-    if (!s.has_law(r)) continue;
-    Eigen::Vector4d weights = force_weights(std::min(1.0, dt * s.rows.strain[r].damping_rate));
-    s.share[r] = weights[0];
-    s.compliance[r] = 1 / (s.share[r] * s.rows.strain[r].stiffness * dt2);
-    weights[1] += weights[0];
-    s.rhs[r] = dt2 * weights.tail<3>().dot(forces.strain.col(r)) / s.scale[r];
-  }
+  s.share_out(s.strains(), [&](int, int begin, int end) {
+    for (int r = begin; r < end; ++r) {
+      s.rhs[r] = 0;
+      if (!s.has_law(r)) continue;
+      Eigen::Vector4d weights = force_weights(std::min(1.0, dt * s.damping_rate[r]));
+      s.share[r] = weights[0];
+      s.compliance[r] = 1 / (s.share[r] * s.stiffness[r] * dt2);
+      weights[1] += weights[0];
+      s.rhs[r] = dt2 * weights.tail<3>().dot(forces.strain.col(r)) / s.scale[r];
+    }
+  });
   for (int i = s.strains(); i < s.size(); ++i)
     s.rhs[i] = dt2 * forces.place((i - s.strains()) % 3, (i - s.strains()) / 3) / s.scale[i];
   s.push(s.rhs, x);
-  for (int r = 0; r < s.strains(); ++r) s.strain_lambda[r] = s.soft(r) ? s.share[r] * dt2 * forces.strain(0, r) : 0;
+  s.share_out(s.strains(), [&](int, int begin, int end) {
+    for (int r = begin; r < end; ++r) s.strain_lambda[r] = s.soft(r) ? s.share[r] * dt2 * forces.strain(0, r) : 0;
+  });
   ProjectionReport report = s.iterate(x, Impl::Directions::start);
   if (!report.converged || report.residual > s.exactness * s.options.residual) {
     // From no force on.
@@ -379,12 +454,21 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
     report.factor_seconds = factor_seconds;
     report.solve_seconds = solve_seconds;
   }
-  s.strain_lambda = s.strain_lambda.cwiseQuotient(s.share);
-  forces.strain.row(2) = forces.strain.row(1);
-  forces.strain.row(1) = forces.strain.row(0);
-  forces.strain.row(0) = s.strain_lambda / dt2;
+  s.share_out(s.strains(), [&](int, int begin, int end) {
+    for (int r = begin; r < end; ++r) {
+      s.strain_lambda[r] /= s.share[r];
+      forces.strain(2, r) = forces.strain(1, r);
+      forces.strain(1, r) = forces.strain(0, r);
+      forces.strain(0, r) = s.strain_lambda[r] / dt2;
+    }
+  });
   forces.place = s.place_lambda / dt2;
   return report;
+}
+
+void FastProjection::use_threads(std::shared_ptr<Workers> workers) {
+  impl_->parts.assign(workers ? static_cast<std::size_t>(workers->count()) : 1, {});
+  impl_->workers = std::move(workers);
 }
 
 ProjectionReport FastProjection::measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {

@@ -373,8 +373,9 @@ struct SharedWork {
     std::vector<int> point;          // control point of each addend that is kept, in order
     std::vector<double> addend;      // 3 each
   };
-  explicit SharedWork(int threads) : workers(threads), parts(static_cast<std::size_t>(workers.count())) {}
-  Workers workers;
+  explicit SharedWork(int threads)
+      : workers(std::make_shared<Workers>(threads)), parts(static_cast<std::size_t>(workers->count())) {}
+  std::shared_ptr<Workers> workers;
   std::vector<Part> parts;
   std::vector<char> shared;                // per control point
   std::vector<PointEnergy<Lanes>> energy;  // per group
@@ -447,7 +448,7 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& i
       });
     }
   };
-  w.workers.run(body);
+  w.workers->run(body);
   for (const SharedWork::Part& part : w.parts)
     for (std::size_t k = 0; k < part.point.size(); ++k)
       subtract(out, part.point[k], part.addend[3 * k], part.addend[3 * k + 1], part.addend[3 * k + 2]);
@@ -459,7 +460,7 @@ void ShellModel::Impl::share(int threads) {
   work.reset();
   if (threads < 2 || point_count < least_points_for_threads) return;
   work = std::make_unique<SharedWork>(threads);
-  threads = work->workers.count();
+  threads = work->workers->count();
   work->energy.resize(groups.size());
   const auto cost = [&](const CellGroup& group) {
     return static_cast<double>(group.points) * layouts[group.panel].functions();
@@ -616,6 +617,9 @@ const Eigen::VectorXd& ShellModel::lumped_drag() const {
 }
 void ShellModel::use_threads(int count) {
   impl_->share(count);
+}
+std::shared_ptr<Workers> ShellModel::workers() const {
+  return impl_->work ? impl_->work->workers : nullptr;
 }
 std::size_t ShellModel::quadrature_points() const {
   return impl_->point_count;

@@ -18,6 +18,8 @@
 
 namespace toile {
 
+class Workers;
+
 // One panel, SI, in the scene's axes. `rest` is unstrained; its directions weft (turned by grain from the u direction
 // within the tangent plane, counter-clockwise seen against the normal) and warp carry eqs. (8) and (9). The u direction
 // is `straight_u`, projected, where that is set: threads of a flat panel are straight however its net is skewed.
@@ -100,6 +102,7 @@ class ShellModel {
   // at a time. Models of fewer than 8000 quadrature points stay on the caller's thread, which is faster. 1: no
   // threads.
   void use_threads(int count);
+  std::shared_ptr<Workers> workers() const;  // those threads, for work between the model's; null: none
 
   std::size_t quadrature_points() const;
   std::size_t table_bytes() const;  // memory of the stored functions

@@ -73,6 +73,33 @@ void functions(const Medians& median) {
                   median("constraint_points_of_a_large_face", "points")));
 }
 
+// What bounds each kernel, and the share of it that is reached. Bytes: tables and factors alone, each time they are read.
+void bounds(const Medians& median) {
+  const double most_operations = median("machine_operations", "items_per_second");
+  const double most_bytes = median("machine_reading", "bytes_per_second");
+  note("this core at most", fmt::format("{:.1f} GFlop/s", most_operations / 1e9),
+       fmt::format("reads {:.1f} GB/s of main memory", most_bytes / 1e9));
+  const auto share = [&](const std::string& what, double seconds, double operations, double bytes) {
+    const double of_operations = operations / seconds / most_operations, of_bytes = bytes / seconds / most_bytes;
+    note(what, fmt::format("{:.0f} % of {}", 100 * std::max(of_operations, of_bytes), of_bytes > of_operations ? "bytes" : "flops"),
+         fmt::format("{:.1f} GFlop/s, {:.1f} GB/s", operations / seconds / 1e9, bytes / seconds / 1e9));
+  };
+  for (const int p : {2, 3})
+    for (const int n : {10, 100, 316}) {
+      const std::string name = fmt::format("shell_force/p:{}/n:{}", p, n);
+      share(fmt::format("  force, p = {0}, {1} x {1}", p, n), median(name, "per_point"),
+            median(fmt::format("force_at_a_point/p:{}", p), "operations"), median(name, "bytes_per_point"));
+    }
+  for (const char* kernel : {"factorisation", "solution"})
+    for (const int n : {10, 32, 100}) {
+      const std::string name = fmt::format("{}/n:{}", kernel, n);
+      share(fmt::format("  {}, {:.0f} rows", kernel, median(name, "rows")), median(name, "cpu_time"),
+            median(name, "operations"), median(name, "bytes"));
+    }
+  // Products with 16 functions of position and five derivatives, 3 components; the basis comes on top.
+  share("  surface points, p = 3", 1 / median("grouped_by_span/p:3/rational:0", "items_per_second"), 6 * 16 * 3 * 2, 0);
+}
+
 void limits(const Medians& median) {
   for (const int n : {10, 32, 100}) {
     const auto iteration = [&](const std::string& solver) {
@@ -145,6 +172,20 @@ void growth(const std::string& samples) {
   grows("factorisation", factorisation, false);
 }
 
+void threads(const std::string& samples) {
+  constexpr double least_gain = 1.6;
+  for (const int n : {50, 100, 316}) {
+    const StepCost one = step_cost(samples, n, 1), two = step_cost(samples, n, 2);
+    const double outside = (one.motion + one.projection) / (two.motion + two.projection);
+    const double with_solution =
+        (one.motion + one.projection + one.solution) / (two.motion + two.projection + two.solution);
+    row(fmt::format("two cores over one, step of {} control points", one.control_points), fmt::format("{:.2f}", outside),
+        ">= 1.6", outside >= least_gain,
+        fmt::format("without the linear system; motion {:.2f}, projection {:.2f}; with solving by the factor {:.2f}",
+                    one.motion / two.motion, one.projection / two.projection, with_solution));
+  }
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -158,8 +199,10 @@ int main(int count, char** arguments) {
     fmt::print("{:<50} {:>16}  {:<22} {:<7} {}\n", "what", "measured", "target", "", "how");
     functions(median);
     limits(median);
+    bounds(median);
     kidnapped(arguments[1]);
     growth(arguments[1]);
+    threads(arguments[1]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

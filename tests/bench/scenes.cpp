@@ -48,11 +48,12 @@ std::vector<DrapeCost> kidnapped_by_step(const std::filesystem::path& samples,
   return costs;
 }
 
-StepCost step_cost(const std::filesystem::path& samples, int per_direction) {
+StepCost step_cost(const std::filesystem::path& samples, int per_direction, int threads) {
   constexpr double least_seconds = 0.5;
   constexpr int least_steps = 5;
   const std::string n = std::to_string(per_direction);
   const Build scene = kidnapped(samples, {"panel.0.refine.control_points=[" + n + "," + n + "]"});
+  scene.model->use_threads(threads);
   const auto system = assemble(scene, 0);
   // Bending bounds the step by h^2; half of what 8 x 8 cells allow.
   const double dt = 2e-3 * std::pow(8.0 / (per_direction - 2), 2);

@@ -17,7 +17,7 @@ struct DrapeCost {
 };
 std::vector<DrapeCost> kidnapped_by_step(const std::filesystem::path& samples, const std::vector<int>& steps_per_frame);
 
-// One step of the same cloth on n x n control points, p = 2, 3 x 3 Gauss points a cell, one core.
+// One step of the same cloth on n x n control points, p = 2, 3 x 3 Gauss points a cell.
 struct StepCost {
   int control_points = 0;
   std::size_t quadrature_points = 0;
@@ -27,7 +27,7 @@ struct StepCost {
   double factorisation = 0;  // s, of one iteration
   double fill = 0;           // nonzeros of the factor per row
 };
-StepCost step_cost(const std::filesystem::path& samples, int per_direction);
+StepCost step_cost(const std::filesystem::path& samples, int per_direction, int threads = 1);
 
 // Slope of log(cost) over log(size) by least squares.
 double exponent(const std::vector<double>& size, const std::vector<double>& cost);

@@ -106,8 +106,13 @@ TEST(IgesRobustness, HugeCountsAreRefusedAndTheFaceBesideThemStays) {
   }
 }
 
-// What tests/fuzz/run found, each within a second of processor time; the name says what it was.
+// What tests/fuzz/run found, each within a second of processor time as the program ships; the name says what it was.
 TEST(IgesRobustness, FindingsOfTheFuzzerStayFixed) {
+#if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__) && !defined(__clang__)
+  constexpr double longest = 1;
+#else
+  constexpr double longest = 20;
+#endif
   for (const auto& entry :
        std::filesystem::directory_iterator(std::filesystem::path(TOILE_TEST_DATA) / "fuzz" / "iges")) {
     SCOPED_TRACE(entry.path().filename().string());
@@ -118,7 +123,7 @@ TEST(IgesRobustness, FindingsOfTheFuzzerStayFixed) {
       EXPECT_TRUE(report.exact()) << (report.differences.empty() ? "" : report.differences[0]);
     } catch (const InputError&) {
     }
-    EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 1);
+    EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, longest);
   }
 }
 

@@ -91,11 +91,16 @@ TEST(Program, TheSameSceneWritesTheSameFiles) {
 TEST(Program, ThreadsGiveTheSameBytes) {
   const Small folder("threads");
   const std::string large =
-      "drape scene.toml --set 'output.formats=[\"vtu\", \"iges\", \"obj\"]' --set output.every=0.0025 "
-      "--until 0.005 --set strain_limit.mode=off --set panel.0.refine.control_points=[44,44] ";
-  ASSERT_EQ(toile(folder, large + "-o one").code, 0);
-  ASSERT_EQ(toile(folder, large + "-o two --threads 2").code, 0);
-  expect_same_results(folder / "one", folder / "two");
+      "drape scene.toml --overwrite --set 'output.formats=[\"vtu\", \"iges\", \"obj\"]' --set output.every=0.0025 "
+      "--until 0.005 --set panel.0.refine.control_points=[44,44] ";
+  for (const std::string more : {"--set strain_limit.mode=off ", "--set load.gravity=[0,0,-981] "}) {
+    for (const char* rest : {"-o one", "-o two --threads 2", "-o three --threads 3"}) {
+      const Outcome run = toile(folder, large + more + rest);
+      ASSERT_EQ(run.code, 0) << run.err;
+    }
+    expect_same_results(folder / "one", folder / "two");
+    expect_same_results(folder / "one", folder / "three");
+  }
   EXPECT_EQ(toile(folder, large + "-o none --threads 0").code, 2);
 }
 
