@@ -15,8 +15,8 @@ namespace toile {
 namespace {
 
 // An envelope whose rows are longer than this in mean square is slower than CHOLMOD (README, "Factor"): a square of
-// some 1,000 rows, a strip or several panels of any size.
-constexpr double longest_rows = 3500;
+// some 3,500 rows, a strip or several panels of any size.
+constexpr double longest_rows = 12000;
 
 // One thread in BLAS and none of OpenMP's in CHOLMOD, which asks for four in each factorisation and waits for them
 // longer than it computes.
@@ -118,25 +118,18 @@ class Envelope {
     factor_.resize(start_[n]);
     inverse_.resize(n);
     work_.resize(n);
+    int longest = 0;
+    for (int k = 0; k < n; ++k) longest = std::max(longest, k - first_[k] + 1);
+    rows_.reserve(static_cast<std::size_t>(longest + lanes));
   }
 
+  // Eight rows at a time, one per lane: the rows above are read once for all of them, and no sum runs across lanes.
   bool factorise(std::span<const double> values) {
     std::fill(factor_.begin(), factor_.end(), 0.0);
     for (std::size_t e = 0; e < slot_.size(); ++e) factor_[slot_[e]] = values[e];
     const int n = static_cast<int>(first_.size());
-    for (int i = 0; i < n; ++i) {
-      double* row = &factor_[start_[i]] - first_[i];
-      double pivot = row[i];
-      for (int j = first_[i]; j < i; ++j) {
-        const double* other = &factor_[start_[j]] - first_[j];
-        const int from = std::max(first_[i], first_[j]);
-        row[j] = (row[j] - dot(row + from, other + from, j - from)) * inverse_[j];
-        pivot -= row[j] * row[j];
-      }
-      if (!(pivot > 0)) return false;
-      row[i] = std::sqrt(pivot);
-      inverse_[i] = 1 / row[i];
-    }
+    for (int row = 0; row < n; row += lanes)
+      if (!factorise_rows(row, std::min(lanes, n - row))) return false;
     return true;
   }
 
@@ -165,6 +158,57 @@ class Envelope {
   }
 
  private:
+  static constexpr int lanes = 8;
+  struct Pack {
+    double __attribute__((vector_size(lanes * sizeof(double)))) v;
+  };
+
+  // sum over [0, count) of x_k coefficient(k), in a fixed order of four sums that don't wait for each other.
+  template <class Coefficient>
+  static Pack combination(const Pack* x, int count, const Coefficient& coefficient) {
+    Pack s0{}, s1{}, s2{}, s3{};
+    int k = 0;
+    for (; k + 4 <= count; k += 4) {
+      s0.v += x[k].v * coefficient(k);
+      s1.v += x[k + 1].v * coefficient(k + 1);
+      s2.v += x[k + 2].v * coefficient(k + 2);
+      s3.v += x[k + 3].v * coefficient(k + 3);
+    }
+    for (; k < count; ++k) s0.v += x[k].v * coefficient(k);
+    return {(s0.v + s1.v) + (s2.v + s3.v)};
+  }
+
+  bool factorise_rows(int begin, int count) {
+    const int first = *std::min_element(first_.begin() + begin, first_.begin() + begin + count);
+    const int columns = begin + count - first;
+    rows_.assign(static_cast<std::size_t>(columns), Pack{});
+    Pack* const x = rows_.data();  // columns from `first` on
+    for (int l = 0; l < count; ++l) {
+      const double* row = &factor_[start_[begin + l]];
+      for (int j = first_[begin + l]; j <= begin + l; ++j) x[j - first].v[l] = *row++;
+    }
+    for (int j = first; j < begin; ++j) {
+      const int from = std::max(first, first_[j]);
+      const double* other = &factor_[start_[j]] + (from - first_[j]);
+      const Pack sum = combination(x + (from - first), j - from, [&](int k) { return other[k]; });
+      x[j - first].v = (x[j - first].v - sum.v) * inverse_[j];
+    }
+    for (int l = 0; l < count; ++l) {
+      const int j = begin + l;
+      const Pack sum = combination(x, j - first, [&](int k) { return x[k].v[l]; });
+      x[j - first].v -= sum.v;
+      const double pivot = x[j - first].v[l];
+      if (!(pivot > 0)) return false;
+      inverse_[j] = 1 / std::sqrt(pivot);
+      x[j - first].v *= inverse_[j];  // lanes of rows above l hold nothing that is read
+    }
+    for (int l = 0; l < count; ++l) {
+      double* row = &factor_[start_[begin + l]];
+      for (int j = first_[begin + l]; j <= begin + l; ++j) *row++ = x[j - first].v[l];
+    }
+    return true;
+  }
+
   // Four partial sums in a fixed order: vectorises, and gives the same bits whatever the alignment.
   static double dot(const double* a, const double* b, int n) {
     double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
@@ -181,6 +225,7 @@ class Envelope {
 
   std::vector<int> order_, first_, start_, slot_;
   std::vector<double> factor_, inverse_;
+  std::vector<Pack> rows_;
   mutable std::vector<double> work_;
 };
 

@@ -210,12 +210,13 @@ TYPED_TEST(AnySolver, ContradictingRowsEndUnconvergedAndFinite) {
   const auto place = [](double x) { return [x](double) { return Eigen::Vector3d(x, 0.5, 0); }; };
   TypeParam projection(
       free_map(c), c.mass,
-      {vertex_rows(c), {{scalar_row(c, 0, 0.5, 0), 0, place(0.0)}, {scalar_row(c, 1, 0.5, 0), 1, place(1.3)}}});
+      {vertex_rows(c), {{scalar_row(c, 0, 0.5, 0), 0, place(0.0)}, {scalar_row(c, 1, 0.5, 0), 1, place(1.3)}}},
+      {.max_iterations = 1000});
   Eigen::VectorXd x = c.rest;
   const ProjectionReport report = projection.project(x, 0);
   EXPECT_FALSE(report.converged);
   EXPECT_TRUE(x.allFinite());
-  EXPECT_LT(report.iterations, 50);
+  EXPECT_LT(report.iterations, 150);  // given up, not used up; one solver tries twice
 }
 
 TYPED_TEST(AnySolver, TwoPinnedCornersOfAStraightEdgeStayFiniteThoughTheRowsDepend) {
