@@ -566,12 +566,20 @@ long double integral(const std::function<long double(long double)>& f, long doub
       0.2223810344533744705443559944262408844L, 0.1012285362903762591525313543099621901L};
   const int parts = quotient ? 10 : 0;
   long double sum = 0, low = a;
-  for (int k = -parts; k <= parts; ++k) {  // up to 2^-11, ..., 1/4, 1/2, 3/4, ..., 1
-    const long double share = k < 0 ? std::ldexp(1.0L, k - 1) : 1 - std::ldexp(1.0L, -k - 1);
-    const long double high = k == parts ? b : a + (b - a) * share;
+  const auto add = [&](long double from, long double to) {
     for (int q = 0; q < 4; ++q)
       for (const int side : {-1, 1})
-        sum += weight[q] * (high - low) / 2 * f((low + high) / 2 + side * node[q] * (high - low) / 2);
+        sum += weight[q] * (to - from) / 2 * f((from + to) / 2 + side * node[q] * (to - from) / 2);
+  };
+  for (int k = -parts; k <= parts; ++k) {  // up to 2^-11, ..., 1/4, 1/2, 3/4, ..., 1
+    const long double share = k < 0 ? std::ldexp(1.0L, k - 1) : 1 - std::ldexp(1.0L, -k - 1);
+    const long double high = k == parts ? b : a + (b - a) * share, middle = (low + high) / 2;
+    if (quotient) {  // poles may be near
+      add(low, middle);
+      add(middle, high);
+    } else {
+      add(low, high);
+    }
     low = high;
   }
   return sum;
