@@ -9,8 +9,8 @@
 namespace toile {
 namespace {
 
-// Sleeping and waking costs more than this; a step's next piece of work is often nearer.
-constexpr int spins = 2000;
+// Up to a millisecond: sleeping and waking costs a twentieth of it, and a step's next piece of work is nearer.
+constexpr int spins = 20000;
 
 template <class T>
 void wait_while(const std::atomic<T>& value, T old) {
