@@ -1,6 +1,7 @@
 #include "io/iges/curve_reading.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "geometry/error.h"
 #include "geometry/refine.h"
@@ -26,8 +27,11 @@ Curve3 offset_curve(Reading& reading, const Entry& e, int depth) {
   Parameters in(reading.file, e, &reading.notes);
   const OffsetCurve record = read_offset_curve(in);
   const Curve3 base = natural_curve(reading, reading.entry(record.curve, e, "curve to offset"), depth + 1).curve;
+  std::optional<Curve3> function;
+  if (record.flag == 3)
+    function = natural_curve(reading, reading.entry(record.function, e, "function of the offset"), depth + 1).curve;
   const double size = (base.points().rowwise().maxCoeff() - base.points().rowwise().minCoeff()).norm();
-  FittedCurve fitted = to_curve(record, base, reading.fit_tolerance(size));
+  FittedCurve fitted = to_curve(record, base, function ? &*function : nullptr, reading.fit_tolerance(size));
   reading.mark(e, Disposition::converted, "offset curve as cubic B-spline, off by " + format_real(fitted.error));
   return std::move(fitted.curve);
 }

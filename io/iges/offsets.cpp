@@ -91,10 +91,11 @@ void write(const OffsetCurve& offset, Record& out) {
   out.real(offset.range.min).real(offset.range.max);
 }
 
-FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, double tolerance) {
-  if (offset.flag != 1 && offset.flag != 2)
-    throw GeometryError("the offset varies as a function (FLAG is " + std::to_string(offset.flag) +
-                        "), must be 1 or 2");
+FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, const Curve3* function, double tolerance) {
+  if (offset.flag < 1 || offset.flag > 3 || (offset.flag == 3) != (function != nullptr))
+    throw GeometryError("FLAG of the offset is " + std::to_string(offset.flag) + ", must be 1 to 3");
+  if (function && (offset.coordinate < 1 || offset.coordinate > 3))
+    throw GeometryError("NDIM of the offset is " + std::to_string(offset.coordinate) + ", must be 1 to 3");
   if (!(offset.normal.norm() > 0)) throw GeometryError("the offset's normal has no length");
   const Eigen::Vector3d z = offset.normal.normalized();
   const double d1 = offset.distances[0], t1 = offset.distances[1], d2 = offset.distances[2], t2 = offset.distances[3];
@@ -102,9 +103,17 @@ FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, double toler
   const bool by_length = offset.kind == 1;
   if (offset.flag == 2 && !(t2 != t1)) throw GeometryError("the offset's two distances stand at one parameter");
   // Distance and its derivative at t.
-  const auto distance = [&](double t, double speed) -> std::pair<double, double> {
+  const auto argument = [&](double t) { return by_length ? arc_length(base, {domain.min, t}) : t; };
+  const auto distance = [&](double t, double speed, int law_span) -> std::pair<double, double> {
     if (offset.flag == 1) return {d1, 0};
-    const double at = by_length ? arc_length(base, {domain.min, t}) : t;
+    const double at = argument(t);
+    if (function) {
+      const Interval known = function->domain();
+      if (at < known.min - 1e-9 * known.length() || at > known.max + 1e-9 * known.length())
+        throw GeometryError("the function of the offset ends before " + format_real(at));
+      const CurveJet<3> f = evaluate_on_span(*function, law_span, std::clamp(at, known.min, known.max));
+      return {f.x[offset.coordinate - 1], f.d1[offset.coordinate - 1] * (by_length ? speed : 1)};
+    }
     const double slope = (d2 - d1) / (t2 - t1);
     return {d1 + (at - t1) * slope, by_length ? slope * speed : slope};
   };
@@ -112,17 +121,40 @@ FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, double toler
   Interval range = offset.range;
   if (!(domain.min <= range.min && range.min < range.max && range.max <= domain.max)) range = domain;
   const Curve3 part = range.min == domain.min && range.max == domain.max ? base : sub_curve(base, range);
-  for (const int span : part.knots().spans())
-    path.push_back(
-        {{part.knots()[span], part.knots()[span + 1]}, [&, span](double t) {
-           const CurveJet<3> c = evaluate_on_span(part, span, t);
-           const double speed = c.d1.norm();
-           if (!(speed > 0)) throw GeometryError("the curve that is offset has no direction somewhere");
-           const Eigen::Vector3d along = c.d1 / speed;
-           const Eigen::Vector3d turning = (c.d2 - along * along.dot(c.d2)) / speed;
-           const auto [d, slope] = distance(t, speed);
-           return PathPoint<3>{c.x + d * z.cross(along), c.d1 + slope * z.cross(along) + d * z.cross(turning)};
-         }});
+  // Where the function may have a kink.
+  constexpr std::size_t most_kinks = 100;
+  std::vector<double> kinks;
+  if (function) {
+    const std::vector<double> breaks = function->knots().breaks();
+    if (breaks.size() > most_kinks) throw GeometryError("the function of the offset has more than 100 knots");
+    for (const double b : breaks) {
+      Interval t = domain;
+      for (int k = 0; by_length && k < 60; ++k) {
+        const double middle = 0.5 * (t.min + t.max);
+        (arc_length(base, {domain.min, middle}) < b ? t.min : t.max) = middle;
+      }
+      kinks.push_back(by_length ? t.max : b);
+    }
+  }
+  for (const int span : part.knots().spans()) {
+    std::vector<double> stops{part.knots()[span]};
+    for (const double b : kinks)
+      if (b > stops.front() && b < part.knots()[span + 1]) stops.push_back(b);
+    stops.push_back(part.knots()[span + 1]);
+    for (std::size_t k = 0; k + 1 < stops.size(); ++k) {
+      const int law_span = function ? function->knots().find_span(argument(0.5 * (stops[k] + stops[k + 1]))) : 0;
+      path.push_back(
+          {{stops[k], stops[k + 1]}, [&, span, law_span](double t) {
+             const CurveJet<3> c = evaluate_on_span(part, span, t);
+             const double speed = c.d1.norm();
+             if (!(speed > 0)) throw GeometryError("the curve that is offset has no direction somewhere");
+             const Eigen::Vector3d along = c.d1 / speed;
+             const Eigen::Vector3d turning = (c.d2 - along * along.dot(c.d2)) / speed;
+             const auto [d, slope] = distance(t, speed, law_span);
+             return PathPoint<3>{c.x + d * z.cross(along), c.d1 + slope * z.cross(along) + d * z.cross(turning)};
+           }});
+    }
+  }
   // At a kink the two sides part: no curve.
   for (std::size_t i = 0; i + 1 < path.size(); ++i) {
     const double gap = (path[i].at(path[i].range.max).x - path[i + 1].at(path[i + 1].range.min).x).norm();

@@ -81,7 +81,8 @@ OffsetSurface read_offset_surface(Parameters& in);
 void write(const OffsetSurface& offset, Record& out);
 FileSurface to_surface(const OffsetSurface& offset, const FileSurface& base, double tolerance);
 
-// 130: a curve moved sideways in a plane, by one distance or by one that varies linearly.
+// 130: a curve moved sideways in a plane, by one distance (flag 1), one that varies linearly (2), or by a coordinate (1
+// to 3) of another curve (3: function).
 struct OffsetCurve {
   int flag = 1, curve = 0, function = 0, coordinate = 0, kind = 0;
   std::array<double, 4> distances{};  // D1, TD1, D2, TD2
@@ -94,7 +95,8 @@ struct FittedCurve {
   Curve3 curve;
   double error = 0;
 };
-FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, double tolerance);
+// `function`: the curve that flag 3 names, else null.
+FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, const Curve3* function, double tolerance);
 
 // 108: A x + B y + C z = D, with a bounding curve (forms 1 and -1) or none.
 struct Plane {

@@ -259,6 +259,14 @@ TEST(IgesFaces, AnOffsetCurveIsFittedInItsBoundary) {
   EXPECT_NE(row(file, 130).why.find("off by"), std::string::npos);
 }
 
+// An edge that bulges by a tenth in its middle: offset of a line by a function of the parameter, and of the length.
+TEST(IgesFaces, AnOffsetFollowsItsFunction) {
+  const std::vector<double> area = areas("function_offset_130");
+  ASSERT_EQ(area.size(), 2u);
+  for (const double a : area) expect_near_rel(a, 100 * 100 * (0.36 - 0.5 * 0.6 * 0.1), 1e-9);
+  EXPECT_EQ(read_corpus("function_offset_130").warnings.size(), 0u);
+}
+
 TEST(IgesFaces, IdleControlPointsOfSurplusKnotsAreLeftOut) {
   const PanelFile file = read_corpus("surplus_knots");
   const NurbsSurface& s = file.panels[0].surface;
