@@ -40,4 +40,13 @@ class Workers {
   std::atomic<int> busy_{0};
 };
 
+// body(part, begin, end) of [0, count), a run of it for each thread; on the caller's thread where there are no workers.
+template <class Body>
+void share_out(Workers* workers, int count, const Body& body) {
+  const int n = workers ? workers->count() : 1;
+  if (n == 1) return body(0, 0, count);
+  const auto at = [&](int part) { return static_cast<int>(static_cast<long>(count) * part / n); };
+  workers->run([&](int part) { body(part, at(part), at(part + 1)); });
+}
+
 }  // namespace toile

@@ -1,8 +1,11 @@
 #include "analysis/dynamics/verlet.h"
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
+#include "analysis/workers.h"
 #include "geometry/clock.h"
 
 namespace toile {
@@ -23,11 +26,13 @@ void acceleration(const DynamicSystem& system, const Vector& q_force, const Vect
                   double h, Vector& a) {
   a.resize(3 * system.map->nodes());
   system.map->reduce(q_force, a);
-  for (int k = 0; k < system.map->nodes(); ++k) {
-    const double m = system.node_mass[k], c = system.node_drag[k];
-    const Eigen::Vector3d known = v.segment<3>(3 * k) + h * constraint.segment<3>(3 * k);
-    a.segment<3>(3 * k) = (a.segment<3>(3 * k) - c * (known - system.loads.wind)) / (m + h * c);
-  }
+  share_out(system.model->workers().get(), system.map->nodes(), [&](int, int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      const double m = system.node_mass[k], c = system.node_drag[k];
+      const Eigen::Vector3d known = v.segment<3>(3 * k) + h * constraint.segment<3>(3 * k);
+      a.segment<3>(3 * k) = (a.segment<3>(3 * k) - c * (known - system.loads.wind)) / (m + h * c);
+    }
+  });
 }
 
 void add(const ScalarRow& row, const Eigen::Vector3d& force, Vector& f) {
@@ -97,10 +102,15 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
 StepReport step(const DynamicSystem& system, DynamicState& state, double dt, StepWork& work) {
   StepReport report;
   report.dt = dt;
+  const std::shared_ptr<Workers> workers = system.model->workers();
+  const int nodes = system.map->nodes();
   DynamicState& next = work.other;
   next.t = state.t + dt;
-  work.candidate = state.x + dt * state.v + (0.5 * dt * dt) * state.a;
-  next.x = work.candidate;
+  for (Vector* v : {&work.candidate, &work.move, &work.constraint, &next.x, &next.v}) v->resize(state.x.size());
+  share_out(workers.get(), nodes, [&](int, int begin, int end) {
+    for (Eigen::Index i = 3 * begin; i < 3 * end; ++i)
+      next.x[i] = work.candidate[i] = state.x[i] + dt * state.v[i] + (0.5 * dt * dt) * state.a[i];
+  });
   report.projection.converged = true;
   if (system.projection) {
     const Clock::time_point start = Clock::now();
@@ -109,10 +119,14 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
     report.limit_energy = report.projection.energy;
     report.projection_seconds = since(start);
   }
-  work.move = next.x - state.x;
-  work.constraint = (next.x - work.candidate) / (dt * dt);
   Vector& v_half = next.v;  // becomes the velocity at the end
-  v_half = work.move / dt;
+  share_out(workers.get(), nodes, [&](int, int begin, int end) {
+    for (Eigen::Index i = 3 * begin; i < 3 * end; ++i) {
+      work.move[i] = next.x[i] - state.x[i];
+      work.constraint[i] = (next.x[i] - work.candidate[i]) / (dt * dt);
+      v_half[i] = work.move[i] / dt;
+    }
+  });
 
   next.q.resize(3 * system.map->control_points());
   system.map->fixed_places(next.t, work.fixed_places);
@@ -123,20 +137,35 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
   acceleration(system, next.f, v_half, work.constraint, 0.5 * dt, next.a);
 
   report.load_work = system.loads.force.dot(next.q - state.q);
-  for (int k = 0; k < system.map->nodes(); ++k) {
-    const auto move = work.move.segment<3>(3 * k), held = work.constraint.segment<3>(3 * k);
-    auto v = v_half.segment<3>(3 * k);
-    const double mass = system.node_mass[k];
-    report.kinetic += 0.5 * mass * v.squaredNorm();
-    report.drag_work -= system.node_drag[k] * (v - system.loads.wind).dot(move);
-    report.kick +=
-        0.125 * dt * dt * mass *
-        std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (next.a.segment<3>(3 * k) + held).squaredNorm());
-    v += 0.5 * dt * next.a.segment<3>(3 * k);
-    if (!system.projection) report.kinetic_end += 0.5 * mass * v.squaredNorm();
+  constexpr int together = 1024;
+  const int blocks = (nodes + together - 1) / together;
+  work.sums.assign(static_cast<std::size_t>(blocks), {});
+  share_out(workers.get(), blocks, [&](int, int begin, int end) {
+    for (int block = begin; block < end; ++block) {
+      StepWork::Sums& sums = work.sums[static_cast<std::size_t>(block)];
+      for (int k = together * block; k < std::min(together * (block + 1), nodes); ++k) {
+        const auto move = work.move.segment<3>(3 * k), held = work.constraint.segment<3>(3 * k);
+        const auto a = next.a.segment<3>(3 * k);
+        auto v = v_half.segment<3>(3 * k);
+        const double mass = system.node_mass[k];
+        sums.kinetic += 0.5 * mass * v.squaredNorm();
+        sums.drag_work -= system.node_drag[k] * (v - system.loads.wind).dot(move);
+        sums.kick += 0.125 * dt * dt * mass *
+                     std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (a + held).squaredNorm());
+        v += 0.5 * dt * a;
+        if (!system.projection) sums.kinetic_end += 0.5 * mass * v.squaredNorm();
+        sums.finite = sums.finite && next.x.segment<3>(3 * k).allFinite() && a.allFinite();
+      }
+    }
+  });
+  for (const StepWork::Sums& sums : work.sums) {
+    report.kinetic += sums.kinetic;
+    report.kinetic_end += sums.kinetic_end;
+    report.kick += sums.kick;
+    report.drag_work += sums.drag_work;
+    report.finite = report.finite && sums.finite;
   }
-  report.finite = std::isfinite(report.kinetic) && std::isfinite(report.elastic.total()) && next.x.allFinite() &&
-                  next.a.allFinite();
+  report.finite = report.finite && std::isfinite(report.kinetic) && std::isfinite(report.elastic.total());
   if (!report.finite) return report;
   report.motion_work = motion_work(system, state, next, work);
   std::swap(state, next);

@@ -49,13 +49,13 @@ struct FastProjection::Impl {
   ConstraintRows rows;
   ProjectionOptions options;
   ComposedRows composed;
-  CompressedRows at_node;             // M^-1 D^T
+  CompressedRows at_node;  // M^-1 D^T
   // Of `rows`, close together, as every iteration reads them.
   std::vector<char> warp;
   std::vector<double> stiffness, damping_rate;
   double least_damping_rate = std::numeric_limits<double>::infinity();  // of rows with a law that damps
-  std::vector<double> gram_diagonal;  // per scalar row; 0: takes no part
-  std::vector<int> system_scalar;     // scalar row of each system row
+  std::vector<double> gram_diagonal;                                    // per scalar row; 0: takes no part
+  std::vector<int> system_scalar;                                       // scalar row of each system row
   SparsePattern pattern;
   std::vector<double> gram, values;  // per entry of the pattern
   std::unique_ptr<Cholesky> factor;
@@ -68,8 +68,8 @@ struct FastProjection::Impl {
   Eigen::VectorXd share;                      // of the force at the end in what acts in a step
   std::vector<char> slack;                    // within the band without a force: takes no part for now
   Eigen::Matrix3Xd place_lambda, strain_impulse;
-  Eigen::Matrix3Xd impulse;     // per scalar row, of one push
-  Eigen::VectorXd row_energy;   // per strain row
+  Eigen::Matrix3Xd impulse;      // per scalar row, of one push
+  Eigen::VectorXd row_energy;    // per strain row
   std::vector<Violation> parts;  // per thread
 
   Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
@@ -95,14 +95,9 @@ struct FastProjection::Impl {
     return sum;
   }
 
-  // body(part, begin, end) of [0, count), a run of it for each thread; what the bodies write must not depend on where the
-  // runs end.
   template <class Body>
   void share_out(int count, const Body& body) {
-    const int n = workers ? workers->count() : 1;
-    if (n == 1) return body(0, 0, count);
-    const auto at = [&](int part) { return static_cast<int>(static_cast<long>(count) * part / n); };
-    workers->run([&](int part) { body(part, at(part), at(part + 1)); });
+    toile::share_out(workers.get(), count, body);
   }
 
   void build(const Eigen::VectorXd& node_mass);
@@ -338,7 +333,9 @@ void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen
 }
 
 void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report) {
-  rhs = scale.cwiseProduct(residual);
+  share_out(size(), [&](int, int begin, int end) {
+    for (int i = begin; i < end; ++i) rhs[i] = scale[i] * residual[i];
+  });
   const Clock::time_point start = Clock::now();
   factor->solve(rhs, solution);
   report.solve_seconds += since(start);
@@ -409,9 +406,8 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   Impl& s = *impl_;
   if (s.options.variant == ProjectionVariant::paper) return project(x, t);
   s.map.fixed_places(t - dt, s.fixed_places);
-  s.share_out(s.strains() + s.places(), [&](int, int begin, int end) {
-    evaluate(s.composed, start, s.fixed_places, begin, end, s.tangents);
-  });
+  s.share_out(s.strains() + s.places(),
+              [&](int, int begin, int end) { evaluate(s.composed, start, s.fixed_places, begin, end, s.tangents); });
   s.begin(t);
   s.point_along(s.tangents);
   s.complete(forces);
