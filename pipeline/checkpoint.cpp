@@ -16,7 +16,7 @@ namespace toile {
 namespace {
 
 constexpr std::string_view first_word = "toile checkpoint ";
-constexpr int format_number = 2;  // raise it when the meaning of a byte changes
+constexpr int format_number = 3;  // raise it when the meaning of a byte changes
 
 // Every step can be undone, so that a change of any one word always shows in the end.
 std::uint64_t checksum(std::string_view bytes) {
@@ -47,7 +47,7 @@ void fields(auto& archive, Like<DynamicState> auto& s) {
   archive(s.t, s.x, s.v, s.a, s.constraint, s.q, s.f);
 }
 void fields(auto& archive, Like<LoopState> auto& s) {
-  archive(s.assembled, s.done, s.dt_scale, s.steps_since_bound, s.scale, s.balance, s.rounding, s.kick);
+  archive(s.assembled, s.done, s.dt_scale, s.steps_since_bound, s.bound_every, s.scale, s.balance, s.rounding, s.kick);
 }
 void fields(auto& archive, Like<ShellModel::Cell> auto& c) {
   archive(c.panel, c.i, c.j);

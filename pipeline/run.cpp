@@ -13,7 +13,9 @@ namespace toile {
 namespace {
 
 constexpr double step_safety = 0.9;   // of the eigenvalue bound
-constexpr int steps_per_bound = 100;  // the bound costs some 40 forces
+constexpr int bound_every = 100;       // steps; the bound costs some 25 forces
+constexpr int bound_rarely = 400;      // steps
+constexpr double bound_holds = 0.01;   // change of the step, from one bound to the next, far less than the safety takes
 // A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the
 // plan.
 constexpr double damped_scale = 0.8, smallest_damped = 0.25;
@@ -152,13 +154,20 @@ class Loop {
   }
 
   void evaluate_bound() {
-    result_.loop.steps_since_bound = 0;
-    result_.loop.dt_scale = std::min(1.0, 2 * result_.loop.dt_scale);
+    LoopState& loop = result_.loop;
+    const bool in_turn = loop.dt_scale == 1 && loop.steps_since_bound >= loop.bound_every;
+    const double before = result_.bound.dt;
+    const int kept = loop.bound_every;
+    loop.steps_since_bound = 0;
+    loop.bound_every = bound_every;
+    loop.dt_scale = std::min(1.0, 2 * loop.dt_scale);
     if (scene_.dt) return;
     const Clock::time_point start = Clock::now();
     const long asked = allocations();
     const System& system = *result_.system;
     result_.bound = bound_of(system);
+    if (in_turn && std::abs(result_.bound.dt / before - 1) <= bound_holds)
+      loop.bound_every = std::min(2 * kept, bound_rarely);
     result_.bound_seconds += since(start);
     result_.allocations.bound += allocations() - asked;
   }
@@ -171,7 +180,7 @@ class Loop {
     return system.projection ? system.projection->energy(result_.state.x, result_.state.t) : 0;
   }
   void advance(double target) {
-    if (result_.loop.steps_since_bound >= steps_per_bound) evaluate_bound();
+    if (result_.loop.steps_since_bound >= result_.loop.bound_every) evaluate_bound();
     double largest = result_.loop.dt_scale * planned_step(scene_, result_.bound);
     if (!scene_.dt) largest *= result_.relaxation.dt_share;
     const double left = target - result_.state.t;

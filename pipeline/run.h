@@ -50,7 +50,7 @@ struct LoopState {
   double assembled = 0;  // s, time whose pins hold
   double done = -1;      // s, last frame or release time that is dealt with; none at first
   double dt_scale = 1;   // of the planned step
-  int steps_since_bound = 0;
+  int steps_since_bound = 0, bound_every = 0;  // steps
   double scale = 0, balance = 0;  // J, energy turned over; unexplained rise
   double rounding = 0;            // J, that nobody sees
   double kick = 0;                // J, of the last accepted step: what a smaller step may seem to gain
@@ -106,7 +106,8 @@ struct RunHooks {
 double rest_tolerance(const Build& build);
 
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
-// state, evaluated anew every 100 steps; where the projection had to damp, less.
+// state, evaluated anew every 100 steps, and less often, up to every 400, where it hardly changes; where the
+// projection had to damp, less.
 //   (1) every number of an accepted step is finite;
 //   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from
 //   step

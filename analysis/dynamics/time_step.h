@@ -15,7 +15,7 @@ struct TimeStepBound {
 };
 
 // Of the undamped, unprojected model at q, with the slope of the bending law at q's curvatures: a state that unbends
-// gets stiffer, so a run asks again. Cost: some 40 applications of the tangent. Deterministic. Throws SolverError
+// gets stiffer, so a run asks again. Cost: 20 to 60 applications of the tangent. Deterministic. Throws SolverError
 // naming the node where a mass is not positive, or where the stiffness at q is not finite.
 TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
                               const Eigen::VectorXd& q);
