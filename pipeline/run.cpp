@@ -13,9 +13,9 @@ namespace toile {
 namespace {
 
 constexpr double step_safety = 0.9;   // of the eigenvalue bound
-constexpr int bound_every = 100;       // steps; the bound costs some 25 forces
-constexpr int bound_rarely = 400;      // steps
-constexpr double bound_holds = 0.01;   // change of the step, from one bound to the next, far less than the safety takes
+constexpr int bound_every = 100;      // steps; the bound costs some 25 forces
+constexpr int bound_rarely = 400;     // steps
+constexpr double bound_holds = 0.01;  // change of the step, from one bound to the next, far less than the safety takes
 // A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the
 // plan.
 constexpr double damped_scale = 0.8, smallest_damped = 0.25;

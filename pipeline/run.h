@@ -47,13 +47,13 @@ struct EnergyBalance {
 
 // What the step loop carries from step to step besides the state of the cloth.
 struct LoopState {
-  double assembled = 0;  // s, time whose pins hold
-  double done = -1;      // s, last frame or release time that is dealt with; none at first
-  double dt_scale = 1;   // of the planned step
+  double assembled = 0;                        // s, time whose pins hold
+  double done = -1;                            // s, last frame or release time that is dealt with; none at first
+  double dt_scale = 1;                         // of the planned step
   int steps_since_bound = 0, bound_every = 0;  // steps
-  double scale = 0, balance = 0;  // J, energy turned over; unexplained rise
-  double rounding = 0;            // J, that nobody sees
-  double kick = 0;                // J, of the last accepted step: what a smaller step may seem to gain
+  double scale = 0, balance = 0;               // J, energy turned over; unexplained rise
+  double rounding = 0;                         // J, that nobody sees
+  double kick = 0;                             // J, of the last accepted step: what a smaller step may seem to gain
 };
 
 // Calls of the memory allocator; warming up is among them.

@@ -1,5 +1,6 @@
 #include "analysis/dynamics/time_step.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -137,6 +138,29 @@ TEST(TimeStep, IsNearTheMeasuredLimitOfARationalCylinderUnderTension) {
   f.bending.twist = 1e-4;
   const auto stretched = [](const ShellModel& model) { return Eigen::VectorXd(1.05 * model.rest()); };
   expect_step_near_limit(make_scene(test::make_panel(test::cylinder_surface(0.3, 2.0, 0.5, 6, 4), f), stretched));
+}
+
+// Also where the search ends at once: few nodes, eigenvalues that come three at a time, one far above the others.
+TEST(TimeStep, BoundsTheLargestEigenvalueOfTheDenseMatrix) {
+  for (const int cells : {1, 2, 5})
+    for (const double lightest : {1.0, 1e-3, 1e-8})
+      for (const double b0 : {0.0, 3.3e-3}) {
+        Scene s = make_scene(test::make_flat_panel(1, 1, 2, cells, cells, fabric(11.7, b0)), at_rest);
+        s.node_mass[s.map.nodes() / 2] *= lightest;
+        const Eigen::Index n = s.q.size();
+        const Eigen::VectorXd scale = s.node_mass.cwiseSqrt().cwiseInverse().replicate(1, 3).transpose().reshaped();
+        Eigen::MatrixXd dense(n, n);
+        Eigen::VectorXd image(n);
+        for (Eigen::Index k = 0; k < n; ++k) {
+          s.model.apply_tangent(s.q, Eigen::VectorXd(scale[k] * Eigen::VectorXd::Unit(n, k)), image);
+          dense.col(k) = scale.cwiseProduct(image);
+        }
+        const double largest = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(dense).eigenvalues()[n - 1];
+        const double bound = time_step_bound(s.model, s.map, s.node_mass, s.q).eigenvalue;
+        SCOPED_TRACE(testing::Message() << cells << " cells, " << lightest << ", " << b0);
+        EXPECT_GE(bound, largest * (1 - 1e-9));
+        EXPECT_LE(bound, largest * 1.03);
+      }
 }
 
 // design.md, Numerics: measured with an independent computation on uniform panels.

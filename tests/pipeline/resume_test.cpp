@@ -16,7 +16,8 @@ namespace {
 
 using test::Folder;
 
-// A released pin between frames, a moved one, rows of a curve pin; the step bound is evaluated anew every 100 steps or more.
+// A released pin between frames, a moved one, rows of a curve pin; the step bound is evaluated anew every 100 steps or
+// more.
 const std::string busy_pins =
     "[[pin]]\nat = \"curve:0,2\"\nmove = { translate = [0, 0, 0.02], end = 0.04 }\n"
     "[[pin]]\nat = \"uv:200,100\"\nrelease = 0.03\n";

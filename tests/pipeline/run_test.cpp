@@ -119,6 +119,32 @@ TEST(Run, StepsLandOnFrames) {
   EXPECT_EQ(result.energy.injected, 0) << "an undriven run gains no energy";
 }
 
+TEST(Run, TheStepBoundIsAskedForLessOftenWhereItHolds) {
+  const Folder folder("bounds");
+  Build quiet = built(folder, test::sheet("cloth"), test::scene_text("", "[load]\ngravity = [0, 0, 0]\n"));
+  Build falling =
+      built(folder, test::sheet("cloth"), test::scene_text(corner_pins, "[load]\ngravity = [0, 0, -300]\n"));
+  quiet.scene.until = falling.scene.until = 1.2;
+  falling.scene.strain_limit.on = false;
+  const RunResult at_rest = run(quiet);
+  ASSERT_GT(at_rest.steps, 700);
+  EXPECT_EQ(at_rest.loop.bound_every, 400);
+
+  // Cloth that stretches and folds changes its stiffness.
+  double bound = 0;
+  int changes = 0;
+  RunHooks hooks;
+  hooks.resumable = [&](const RunResult& r) {
+    if (bound > 0 && std::abs(r.bound.dt / bound - 1) > 0.01) {
+      ++changes;
+      EXPECT_EQ(r.loop.bound_every, 100);
+    }
+    bound = r.bound.dt;
+  };
+  ASSERT_EQ(run(falling, hooks).exit, RunExit::ok);
+  EXPECT_GE(changes, 3);
+}
+
 TEST(Run, TheSameSceneGivesTheSameBytes) {
   const Folder folder("bytes");
   const Build b = built(folder, test::trimmed_sheet("cloth"), test::scene_text("[[pin]]\nat = \"curve:0,2\"\n"));
