@@ -1,4 +1,5 @@
-// Sparse symmetric positive definite systems with a fixed pattern, by CHOLMOD: analysed once, refactored at will.
+// Sparse symmetric positive definite systems with a fixed pattern, analysed once, refactored at will: by an envelope
+// where its rows are short, else by CHOLMOD.
 #pragma once
 
 #include <Eigen/Core>

@@ -91,58 +91,80 @@ void write(const OffsetCurve& offset, Record& out) {
   out.real(offset.range.min).real(offset.range.max);
 }
 
+namespace {
+
+// Distance of an offset curve from its base along it.
+struct DistanceLaw {
+  const OffsetCurve& offset;
+  const Curve3& base;
+  const Curve3* function;  // of FLAG 3, else null
+
+  bool by_length() const { return offset.kind == 1; }
+  double length_to(double t) const { return arc_length(base, {base.domain().min, t}); }
+  // What the law depends on, at the base's parameter t.
+  double argument(double t) const { return by_length() ? length_to(t) : t; }
+  int span_at(double t) const { return function ? function->knots().find_span(argument(t)) : 0; }
+
+  // Parameters of the base where the function may have a kink, ascending.
+  std::vector<double> breaks() const {
+    if (!function) return {};
+    constexpr std::size_t most = 100;
+    std::vector<double> out = function->knots().breaks();
+    if (out.size() > most) throw GeometryError("the function of the offset has more than 100 knots");
+    if (!by_length()) return out;
+    for (double& at : out) {
+      Interval t = base.domain();
+      for (int k = 0; k < 60; ++k) {
+        const double middle = 0.5 * (t.min + t.max);
+        (length_to(middle) < at ? t.min : t.max) = middle;
+      }
+      at = t.max;
+    }
+    return out;
+  }
+
+  // Distance and its derivative in t, where the base has this speed; `span` is the function's.
+  std::pair<double, double> at(double t, double speed, int span) const {
+    const auto [d1, t1, d2, t2] = offset.distances;
+    if (offset.flag == 1) return {d1, 0};
+    const double x = argument(t), dx = by_length() ? speed : 1;
+    if (!function) {
+      const double slope = (d2 - d1) / (t2 - t1);
+      return {d1 + (x - t1) * slope, slope * dx};
+    }
+    const Interval known = function->domain();
+    if (x < known.min - 1e-9 * known.length() || x > known.max + 1e-9 * known.length())
+      throw GeometryError("the function of the offset ends before " + format_real(x));
+    const CurveJet<3> f = evaluate_on_span(*function, span, std::clamp(x, known.min, known.max));
+    return {f.x[offset.coordinate - 1], f.d1[offset.coordinate - 1] * dx};
+  }
+};
+
+}  // namespace
+
 FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, const Curve3* function, double tolerance) {
   if (offset.flag < 1 || offset.flag > 3 || (offset.flag == 3) != (function != nullptr))
     throw GeometryError("FLAG of the offset is " + std::to_string(offset.flag) + ", must be 1 to 3");
   if (function && (offset.coordinate < 1 || offset.coordinate > 3))
     throw GeometryError("NDIM of the offset is " + std::to_string(offset.coordinate) + ", must be 1 to 3");
   if (!(offset.normal.norm() > 0)) throw GeometryError("the offset's normal has no length");
+  if (offset.flag == 2 && !(offset.distances[3] != offset.distances[1]))
+    throw GeometryError("the offset's two distances stand at one parameter");
   const Eigen::Vector3d z = offset.normal.normalized();
-  const double d1 = offset.distances[0], t1 = offset.distances[1], d2 = offset.distances[2], t2 = offset.distances[3];
+  const DistanceLaw law{offset, base, function};
   const Interval domain = base.domain();
-  const bool by_length = offset.kind == 1;
-  if (offset.flag == 2 && !(t2 != t1)) throw GeometryError("the offset's two distances stand at one parameter");
-  // Distance and its derivative at t.
-  const auto argument = [&](double t) { return by_length ? arc_length(base, {domain.min, t}) : t; };
-  const auto distance = [&](double t, double speed, int law_span) -> std::pair<double, double> {
-    if (offset.flag == 1) return {d1, 0};
-    const double at = argument(t);
-    if (function) {
-      const Interval known = function->domain();
-      if (at < known.min - 1e-9 * known.length() || at > known.max + 1e-9 * known.length())
-        throw GeometryError("the function of the offset ends before " + format_real(at));
-      const CurveJet<3> f = evaluate_on_span(*function, law_span, std::clamp(at, known.min, known.max));
-      return {f.x[offset.coordinate - 1], f.d1[offset.coordinate - 1] * (by_length ? speed : 1)};
-    }
-    const double slope = (d2 - d1) / (t2 - t1);
-    return {d1 + (at - t1) * slope, by_length ? slope * speed : slope};
-  };
   std::vector<SmoothPath<3>> path;
   Interval range = offset.range;
   if (!(domain.min <= range.min && range.min < range.max && range.max <= domain.max)) range = domain;
   const Curve3 part = range.min == domain.min && range.max == domain.max ? base : sub_curve(base, range);
-  // Where the function may have a kink.
-  constexpr std::size_t most_kinks = 100;
-  std::vector<double> kinks;
-  if (function) {
-    const std::vector<double> breaks = function->knots().breaks();
-    if (breaks.size() > most_kinks) throw GeometryError("the function of the offset has more than 100 knots");
-    for (const double b : breaks) {
-      Interval t = domain;
-      for (int k = 0; by_length && k < 60; ++k) {
-        const double middle = 0.5 * (t.min + t.max);
-        (arc_length(base, {domain.min, middle}) < b ? t.min : t.max) = middle;
-      }
-      kinks.push_back(by_length ? t.max : b);
-    }
-  }
+  const std::vector<double> breaks = law.breaks();
   for (const int span : part.knots().spans()) {
     std::vector<double> stops{part.knots()[span]};
-    for (const double b : kinks)
+    for (const double b : breaks)
       if (b > stops.front() && b < part.knots()[span + 1]) stops.push_back(b);
     stops.push_back(part.knots()[span + 1]);
     for (std::size_t k = 0; k + 1 < stops.size(); ++k) {
-      const int law_span = function ? function->knots().find_span(argument(0.5 * (stops[k] + stops[k + 1]))) : 0;
+      const int law_span = law.span_at(0.5 * (stops[k] + stops[k + 1]));
       path.push_back(
           {{stops[k], stops[k + 1]}, [&, span, law_span](double t) {
              const CurveJet<3> c = evaluate_on_span(part, span, t);
@@ -150,7 +172,7 @@ FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, const Curve3
              if (!(speed > 0)) throw GeometryError("the curve that is offset has no direction somewhere");
              const Eigen::Vector3d along = c.d1 / speed;
              const Eigen::Vector3d turning = (c.d2 - along * along.dot(c.d2)) / speed;
-             const auto [d, slope] = distance(t, speed, law_span);
+             const auto [d, slope] = law.at(t, speed, law_span);
              return PathPoint<3>{c.x + d * z.cross(along), c.d1 + slope * z.cross(along) + d * z.cross(turning)};
            }});
     }

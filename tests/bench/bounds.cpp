@@ -1,5 +1,5 @@
-// What the machine can do at most, and what kernels ask of it: floating-point operations (counted, not estimated) and
-// bytes. bench_report divides one by the other.
+// What the machine can do at most, and what kernels ask of it: floating-point operations (those of the laws counted
+// as they run, those of the sums over functions by hand) and bytes. bench_report divides one by the other.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Core>
@@ -46,8 +46,8 @@ double force_operations(int degree) {
   Counted::operations = 0;
   energy_gradient(PointLaw(Fabric{}), jet, Curvature<Counted>{}, gradient);
   const double law = static_cast<double>(Counted::operations);
-  const double along_v = 2 * 3 * 6 * side;     // 3 sums there and 3 back, 6 operations each, (p+1)^3 of each a cell
-  const double along_u = 2 * 5 * 6 * side;     // 5 sums there and 5 back at each point
+  const double along_v = 2 * 3 * 6 * side;        // 3 sums there and 3 back, 6 operations each, (p+1)^3 of each a cell
+  const double along_u = 2 * 5 * 6 * side;        // 5 sums there and 5 back at each point
   const double to_cloth_and_back = 56 + 53 + 12;  // parameters to weft and warp, transposed, times the weight
   return law + along_v + along_u + to_cloth_and_back;
 }

@@ -73,7 +73,8 @@ void functions(const Medians& median) {
                   median("constraint_points_of_a_large_face", "points")));
 }
 
-// What bounds each kernel, and the share of it that is reached. Bytes: tables and factors alone, each time they are read.
+// What bounds each kernel, and the share of it that is reached. Bytes: tables and factors alone, each time they are
+// read.
 void bounds(const Medians& median) {
   const double most_operations = median("machine_operations", "items_per_second");
   const double most_bytes = median("machine_reading", "bytes_per_second");
@@ -81,7 +82,9 @@ void bounds(const Medians& median) {
        fmt::format("reads {:.1f} GB/s of main memory", most_bytes / 1e9));
   const auto share = [&](const std::string& what, double seconds, double operations, double bytes) {
     const double of_operations = operations / seconds / most_operations, of_bytes = bytes / seconds / most_bytes;
-    note(what, fmt::format("{:.0f} % of {}", 100 * std::max(of_operations, of_bytes), of_bytes > of_operations ? "bytes" : "flops"),
+    note(what,
+         fmt::format("{:.0f} % of {}", 100 * std::max(of_operations, of_bytes),
+                     of_bytes > of_operations ? "bytes" : "flops"),
          fmt::format("{:.1f} GFlop/s, {:.1f} GB/s", operations / seconds / 1e9, bytes / seconds / 1e9));
   };
   for (const int p : {2, 3})
@@ -179,8 +182,8 @@ void threads(const std::string& samples) {
     const double outside = (one.motion + one.projection) / (two.motion + two.projection);
     const double with_solution =
         (one.motion + one.projection + one.solution) / (two.motion + two.projection + two.solution);
-    row(fmt::format("two cores over one, step of {} control points", one.control_points), fmt::format("{:.2f}", outside),
-        ">= 1.6", outside >= least_gain,
+    row(fmt::format("two cores over one, step of {} control points", one.control_points),
+        fmt::format("{:.2f}", outside), ">= 1.6", outside >= least_gain,
         fmt::format("without the linear system; motion {:.2f}, projection {:.2f}; with solving by the factor {:.2f}",
                     one.motion / two.motion, one.projection / two.projection, with_solution));
   }

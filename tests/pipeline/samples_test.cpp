@@ -44,6 +44,16 @@ void expect_same_panels(const PanelFile& a, const PanelFile& b) {
     EXPECT_LE((x - y).cwiseAbs().maxCoeff(), rounding * x.cwiseAbs().maxCoeff());
   };
   ASSERT_EQ(a.panels.size(), b.panels.size());
+  const auto as_vector = [](std::span<const double> s) {
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(s.data(), static_cast<Eigen::Index>(s.size())));
+  };
+  const auto expect_same_curve = [&](const auto& x, const auto& y) {
+    EXPECT_EQ(x.knots().degree(), y.knots().degree());
+    expect_near(as_vector(x.knots().knots()), as_vector(y.knots().knots()));
+    expect_near(x.points(), y.points());
+    ASSERT_EQ(x.rational(), y.rational());
+    if (x.rational()) expect_near(as_vector(x.weights()), as_vector(y.weights()));
+  };
   for (std::size_t k = 0; k < a.panels.size(); ++k) {
     const TrimmedSurface &p = a.panels[k], &q = b.panels[k];
     EXPECT_EQ(p.name, q.name);
@@ -52,21 +62,20 @@ void expect_same_panels(const PanelFile& a, const PanelFile& b) {
     for (const Direction d : {Direction::u, Direction::v}) {
       const KnotVector &x = p.surface.knots(d), &y = q.surface.knots(d);
       EXPECT_EQ(x.degree(), y.degree());
-      const auto as_vector = [](std::span<const double> s) {
-        return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(s.data(), static_cast<Eigen::Index>(s.size())));
-      };
       expect_near(as_vector(x.knots()), as_vector(y.knots()));
     }
     expect_near(p.surface.points(), q.surface.points());
+    ASSERT_EQ(p.surface.rational(), q.surface.rational());
+    if (p.surface.rational()) expect_near(as_vector(p.surface.weights()), as_vector(q.surface.weights()));
     ASSERT_EQ(p.loops.size(), q.loops.size());
     for (std::size_t l = 0; l < p.loops.size(); ++l) {
       ASSERT_EQ(p.loops[l].curves.size(), q.loops[l].curves.size());
       for (std::size_t c = 0; c < p.loops[l].curves.size(); ++c) {
         const TrimCurve &x = p.loops[l].curves[c], &y = q.loops[l].curves[c];
         EXPECT_EQ(x.reversed, y.reversed);
-        expect_near(x.curve.points(), y.curve.points());
+        expect_same_curve(x.curve, y.curve);
         ASSERT_EQ(x.model.has_value(), y.model.has_value());
-        if (x.model) expect_near(x.model->points(), y.model->points());
+        if (x.model) expect_same_curve(*x.model, *y.model);
       }
     }
   }
