@@ -69,6 +69,7 @@ AffineMap::AffineMap(const Matrix& dependence, std::vector<int> fixed, Motion mo
     }
   }
   free_ = assemble(n, static_cast<int>(node_control_point_.size()), free_entries);
+  transposed_ = free_.transpose();
   fixed_part_ = assemble(n, static_cast<int>(fixed_.size()), fixed_entries);
 }
 
@@ -94,21 +95,28 @@ void AffineMap::expand(const Eigen::Ref<const Eigen::VectorXd>& x, double t, Eig
 }
 
 void AffineMap::expand(const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Matrix3Xd& places,
-                       Eigen::Ref<Eigen::VectorXd> q) const {
+                       Eigen::Ref<Eigen::VectorXd> q, Workers* workers) const {
   assert(x.size() == 3 * nodes() && q.size() == 3 * control_points());
-  for (int i = 0; i < control_points(); ++i) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (Matrix::InnerIterator e(free_, i); e; ++e) sum += e.value() * x.segment<3>(3 * e.col());
-    for (Matrix::InnerIterator e(fixed_part_, i); e; ++e) sum += e.value() * places.col(e.col());
-    q.segment<3>(3 * i) = sum;
-  }
+  share_out(workers, control_points(), [&](int, int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (Matrix::InnerIterator e(free_, i); e; ++e) sum += e.value() * x.segment<3>(3 * e.col());
+      for (Matrix::InnerIterator e(fixed_part_, i); e; ++e) sum += e.value() * places.col(e.col());
+      q.segment<3>(3 * i) = sum;
+    }
+  });
 }
 
-void AffineMap::reduce(const Eigen::Ref<const Eigen::VectorXd>& f, Eigen::Ref<Eigen::VectorXd> fx) const {
+void AffineMap::reduce(const Eigen::Ref<const Eigen::VectorXd>& f, Eigen::Ref<Eigen::VectorXd> fx,
+                       Workers* workers) const {
   assert(f.size() == 3 * control_points() && fx.size() == 3 * nodes());
-  fx.setZero();
-  for (int i = 0; i < control_points(); ++i)
-    for (Matrix::InnerIterator e(free_, i); e; ++e) fx.segment<3>(3 * e.col()) += e.value() * f.segment<3>(3 * i);
+  share_out(workers, nodes(), [&](int, int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (Matrix::InnerIterator e(transposed_, k); e; ++e) sum += e.value() * f.segment<3>(3 * e.col());
+      fx.segment<3>(3 * k) = sum;
+    }
+  });
 }
 
 Eigen::VectorXd AffineMap::reduce_scalar(const Eigen::Ref<const Eigen::VectorXd>& m) const {

@@ -6,6 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "analysis/workers.h"
+
 namespace toile {
 
 // x: free nodes (xyz interleaved, 3 n_x numbers), q: control points (3 n_q). T acts on nodes, alike in x, y and z.
@@ -36,17 +38,18 @@ class AffineMap {
                     Eigen::Matrix3Xd& places) const;  // into memory that has the size already: allocates nothing
 
   void expand(const Eigen::Ref<const Eigen::VectorXd>& x, double t, Eigen::Ref<Eigen::VectorXd> q) const;
-  // The same with the places of the fixed control points at hand; allocates nothing.
+  // The same with the places of the fixed control points at hand; allocates nothing. Workers: the same bits.
   void expand(const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Matrix3Xd& fixed_places,
-              Eigen::Ref<Eigen::VectorXd> q) const;
+              Eigen::Ref<Eigen::VectorXd> q, Workers* workers = nullptr) const;
   // T^T f for forces and other dual quantities (3 n_q -> 3 n_x), and for nodal scalars such as masses (n_q -> n_x).
-  void reduce(const Eigen::Ref<const Eigen::VectorXd>& f, Eigen::Ref<Eigen::VectorXd> fx) const;
+  void reduce(const Eigen::Ref<const Eigen::VectorXd>& f, Eigen::Ref<Eigen::VectorXd> fx,
+              Workers* workers = nullptr) const;
   Eigen::VectorXd reduce_scalar(const Eigen::Ref<const Eigen::VectorXd>& m) const;
   // x of a state q that satisfies the map (reads the node's own control points).
   Eigen::VectorXd restrict(const Eigen::Ref<const Eigen::VectorXd>& q) const;
 
  private:
-  Matrix free_, fixed_part_;
+  Matrix free_, transposed_, fixed_part_;
   std::vector<int> fixed_, node_control_point_;
   Motion motion_;
 };

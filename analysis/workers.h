@@ -1,6 +1,7 @@
 // A few threads that do the parts of one piece of work at the same time.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 #include <vector>
@@ -47,6 +48,19 @@ void share_out(Workers* workers, int count, const Body& body) {
   if (n == 1) return body(0, 0, count);
   const auto at = [&](int part) { return static_cast<int>(static_cast<long>(count) * part / n); };
   workers->run([&](int part) { body(part, at(part), at(part + 1)); });
+}
+
+// Pieces of a fixed size, body(piece, begin, end): vectorised loops and sums within a piece come out the same to the
+// last bit for any number of threads.
+constexpr int piece_size = 1024;
+constexpr int pieces(int count) {
+  return (count + piece_size - 1) / piece_size;
+}
+template <class Body>
+void share_pieces(Workers* workers, int count, const Body& body) {
+  share_out(workers, pieces(count), [&](int, int first, int end) {
+    for (int k = first; k < end; ++k) body(k, piece_size * k, std::min(piece_size * (k + 1), count));
+  });
 }
 
 }  // namespace toile

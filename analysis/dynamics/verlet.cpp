@@ -25,7 +25,7 @@ ShellEnergy total_force(const DynamicSystem& system, const Vector& q, Vector& f)
 void acceleration(const DynamicSystem& system, const Vector& q_force, const Vector& v, const Vector& constraint,
                   double h, Vector& a) {
   a.resize(3 * system.map->nodes());
-  system.map->reduce(q_force, a);
+  system.map->reduce(q_force, a, system.model->workers().get());
   share_out(system.model->workers().get(), system.map->nodes(), [&](int, int begin, int end) {
     for (int k = begin; k < end; ++k) {
       const double m = system.node_mass[k], c = system.node_drag[k];
@@ -107,9 +107,10 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
   DynamicState& next = work.other;
   next.t = state.t + dt;
   for (Vector* v : {&work.candidate, &work.move, &work.constraint, &next.x, &next.v}) v->resize(state.x.size());
-  share_out(workers.get(), nodes, [&](int, int begin, int end) {
-    for (Eigen::Index i = 3 * begin; i < 3 * end; ++i)
-      next.x[i] = work.candidate[i] = state.x[i] + dt * state.v[i] + (0.5 * dt * dt) * state.a[i];
+  share_pieces(workers.get(), nodes, [&](int, int begin, int end) {
+    const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
+    piece(work.candidate) = piece(state.x) + dt * piece(state.v) + (0.5 * dt * dt) * piece(state.a);
+    piece(next.x) = piece(work.candidate);
   });
   report.projection.converged = true;
   if (system.projection) {
@@ -120,49 +121,51 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
     report.projection_seconds = since(start);
   }
   Vector& v_half = next.v;  // becomes the velocity at the end
-  share_out(workers.get(), nodes, [&](int, int begin, int end) {
-    for (Eigen::Index i = 3 * begin; i < 3 * end; ++i) {
-      work.move[i] = next.x[i] - state.x[i];
-      work.constraint[i] = (next.x[i] - work.candidate[i]) / (dt * dt);
-      v_half[i] = work.move[i] / dt;
-    }
+  share_pieces(workers.get(), nodes, [&](int, int begin, int end) {
+    const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
+    piece(work.move) = piece(next.x) - piece(state.x);
+    piece(work.constraint) = (piece(next.x) - piece(work.candidate)) / (dt * dt);
+    piece(v_half) = piece(work.move) / dt;
   });
 
   next.q.resize(3 * system.map->control_points());
   system.map->fixed_places(next.t, work.fixed_places);
-  system.map->expand(next.x, work.fixed_places, next.q);
+  system.map->expand(next.x, work.fixed_places, next.q, workers.get());
   const Clock::time_point start = Clock::now();
   report.elastic = total_force(system, next.q, next.f);
   report.force_seconds = since(start);
   acceleration(system, next.f, v_half, work.constraint, 0.5 * dt, next.a);
 
-  report.load_work = system.loads.force.dot(next.q - state.q);
-  constexpr int together = 1024;
-  const int blocks = (nodes + together - 1) / together;
-  work.sums.assign(static_cast<std::size_t>(blocks), {});
-  share_out(workers.get(), blocks, [&](int, int begin, int end) {
-    for (int block = begin; block < end; ++block) {
-      StepWork::Sums& sums = work.sums[static_cast<std::size_t>(block)];
-      for (int k = together * block; k < std::min(together * (block + 1), nodes); ++k) {
-        const auto move = work.move.segment<3>(3 * k), held = work.constraint.segment<3>(3 * k);
-        const auto a = next.a.segment<3>(3 * k);
-        auto v = v_half.segment<3>(3 * k);
-        const double mass = system.node_mass[k];
-        sums.kinetic += 0.5 * mass * v.squaredNorm();
-        sums.drag_work -= system.node_drag[k] * (v - system.loads.wind).dot(move);
-        sums.kick += 0.125 * dt * dt * mass *
-                     std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (a + held).squaredNorm());
-        v += 0.5 * dt * a;
-        if (!system.projection) sums.kinetic_end += 0.5 * mass * v.squaredNorm();
-        sums.finite = sums.finite && next.x.segment<3>(3 * k).allFinite() && a.allFinite();
-      }
+  const int control_points = system.map->control_points();
+  work.sums.assign(static_cast<std::size_t>(pieces(control_points)), {});
+  share_pieces(workers.get(), nodes, [&](int index, int begin, int end) {
+    StepWork::Sums sums;
+    for (int k = begin; k < end; ++k) {
+      const auto move = work.move.segment<3>(3 * k), held = work.constraint.segment<3>(3 * k);
+      const auto a = next.a.segment<3>(3 * k);
+      auto v = v_half.segment<3>(3 * k);
+      const double mass = system.node_mass[k];
+      sums.kinetic += 0.5 * mass * v.squaredNorm();
+      sums.drag_work -= system.node_drag[k] * (v - system.loads.wind).dot(move);
+      sums.kick += 0.125 * dt * dt * mass *
+                   std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (a + held).squaredNorm());
+      v += 0.5 * dt * a;
+      if (!system.projection) sums.kinetic_end += 0.5 * mass * v.squaredNorm();
+      sums.finite = sums.finite && next.x.segment<3>(3 * k).allFinite() && a.allFinite();
     }
+    work.sums[static_cast<std::size_t>(index)] = sums;
+  });
+  share_pieces(workers.get(), control_points, [&](int index, int begin, int end) {
+    const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
+    work.sums[static_cast<std::size_t>(index)].load_work =
+        piece(system.loads.force).dot(piece(next.q) - piece(state.q));
   });
   for (const StepWork::Sums& sums : work.sums) {
     report.kinetic += sums.kinetic;
     report.kinetic_end += sums.kinetic_end;
     report.kick += sums.kick;
     report.drag_work += sums.drag_work;
+    report.load_work += sums.load_work;
     report.finite = report.finite && sums.finite;
   }
   report.finite = report.finite && std::isfinite(report.kinetic) && std::isfinite(report.elastic.total());

@@ -63,9 +63,9 @@ void initialise(const DynamicSystem& system, DynamicState& state);
 // A step that ends in non-finite numbers leaves `state` as it was and says so. With `work` from an earlier step of the
 // same system nothing is allocated but by the projection.
 struct StepWork {
-  // Energies of some nodes that lie together, so that no sum depends on the number of threads.
+  // Energies of a piece of the nodes or control points, so that no sum depends on the number of threads.
   struct Sums {
-    double kinetic = 0, kinetic_end = 0, kick = 0, drag_work = 0;
+    double kinetic = 0, kinetic_end = 0, kick = 0, drag_work = 0, load_work = 0;
     bool finite = true;
   };
   DynamicState other;  // after a finite step: the state before it, which a swap brings back
