@@ -45,7 +45,7 @@ struct UsageError : std::runtime_error {
 struct Common {
   bool quiet = false, verbose = false, json = false, no_progress = false, overwrite = false;
   std::string colour = "auto";
-  int threads = 1;
+  int threads = 0;  // unset: one for a drape, each core for inspect
 };
 
 void add_common(CLI::App& app, Common& common) {
@@ -55,7 +55,8 @@ void add_common(CLI::App& app, Common& common) {
   app.add_flag("--no-progress", common.no_progress, "No progress line");
   app.add_flag("--overwrite", common.overwrite, "Replace files of a former run");
   app.add_option("--color", common.colour, "auto or never")->check(CLI::IsMember({"auto", "never"}));
-  app.add_option("--threads", common.threads, "Threads of a drape; any number gives the same bytes")
+  app.add_option("--threads", common.threads,
+                 "Threads of a drape (1) or of inspect (one for each core); any number gives the same bytes")
       ->check(CLI::Range(1, 64));
 }
 
@@ -136,7 +137,7 @@ int run_drape(const DrapeArguments& a, const Common& common, Console& console) {
   options.overwrite = common.overwrite;
   options.json = common.json;
   std::signal(SIGPIPE, SIG_IGN);  // a reader of the messages that goes away doesn't end the run
-  options.threads = common.threads;
+  options.threads = std::max(1, common.threads);
   if (allocation_count()) options.allocations = [] { return *allocation_count(); };
   if (a.resume) options.resume = *a.resume;
   return drape(std::move(scene), options, console);
@@ -173,7 +174,9 @@ int run_convert(const InspectArguments& a, const std::string& target, const Comm
 }
 
 int run_inspect(const InspectArguments& a, const Common& common, Console& console) {
-  const Inspection inspection = inspect(read_panels(a.input), options_of(a));
+  InspectOptions options = options_of(a);
+  options.threads = common.threads;
+  const Inspection inspection = inspect(read_panels(a.input), options);
   const auto draw = [&](const std::string& target, auto format) {
     if (target.empty()) return;
     write_file(target, format(inspection));
@@ -183,7 +186,7 @@ int run_inspect(const InspectArguments& a, const Common& common, Console& consol
   draw(a.png, inspect_png);
   draw(a.html, inspect_html);
   if (common.json) {
-    fmt::print("{}\n", json_text(inspect_json(inspection), 1));
+    fmt::print("{}\n", json_text(inspect_json(inspection, common.threads), 1));
   } else {
     fmt::print("{}", inspect_text(inspection, common.verbose));
   }
@@ -252,7 +255,7 @@ int run_study_file(const std::string& input, const std::string& directory, const
   if (!directory.empty()) options.directory = directory;
   options.overwrite = common.overwrite;
   options.json = common.json;
-  options.threads = common.threads;
+  options.threads = std::max(1, common.threads);
   return run_study(read_study(input), options, console);
 }
 

@@ -4,13 +4,18 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <exception>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
+#include <thread>
 
 #include "analysis/extension.h"
 #include "analysis/projection/point_rule.h"
 #include "analysis/projection/select_rows.h"
+#include "analysis/workers.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "pipeline/build.h"
@@ -291,6 +296,28 @@ NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) 
   }
 }
 
+namespace {
+
+// body(k) for every k below `count`, each by the first thread that is free; what each threw.
+template <class Body>
+std::vector<std::exception_ptr> deal_out(std::size_t count, int threads, const Body& body) {
+  if (threads <= 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  std::vector<std::exception_ptr> errors(count);
+  std::atomic<std::size_t> next = 0;
+  Workers(static_cast<int>(std::min<std::size_t>(threads, count))).run([&](int) {
+    for (std::size_t k = next++; k < count; k = next++) {
+      try {
+        body(k);
+      } catch (...) {
+        errors[k] = std::current_exception();
+      }
+    }
+  });
+  return errors;
+}
+
+}  // namespace
+
 Inspection inspect(const PanelFile& file, const InspectOptions& options) {
   Inspection out;
   out.file = file.path;
@@ -299,16 +326,20 @@ Inspection inspect(const PanelFile& file, const InspectOptions& options) {
   out.entities = file.entities;
   out.warnings = file.warnings;
   out.ledger = file.ledger;
-  for (const TrimmedSurface& face : file.panels) {
+  std::vector<std::optional<InspectedPanel>> panels(file.panels.size());
+  const std::vector<std::exception_ptr> errors = deal_out(
+      panels.size(), options.threads, [&](std::size_t k) { panels[k] = inspect(file.panels[k], options); });
+  for (std::size_t k = 0; k < panels.size(); ++k) {
     try {
-      out.panels.push_back(inspect(face, options));
+      if (errors[k]) std::rethrow_exception(errors[k]);
     } catch (const GeometryError& error) {
-      if (file.panels.size() == 1) throw;
+      if (panels.size() == 1) throw;
       out.refused.emplace_back(error.what());
       continue;
     }
-    const auto& warnings = out.panels.back().warnings;
-    out.warnings.insert(out.warnings.end(), warnings.begin(), warnings.end());
+    out.warnings.insert(out.warnings.end(), panels[k]->warnings.begin(), panels[k]->warnings.end());
+    out.panels.push_back(*std::move(panels[k]));
+    panels[k].reset();
   }
   if (out.panels.empty() && !out.refused.empty()) throw GeometryError(out.refused.front());
   return out;
@@ -368,11 +399,13 @@ std::string ledger_text(const std::vector<LedgerEntry>& ledger) {
   return out;
 }
 
-nlohmann::ordered_json inspect_json(const Inspection& inspection) {
+nlohmann::ordered_json inspect_json(const Inspection& inspection, int threads) {
   nlohmann::ordered_json entities = nlohmann::ordered_json::object();
   for (const auto& [type, count] : inspection.entities) entities[std::to_string(type)] = count;
-  nlohmann::ordered_json panels = nlohmann::ordered_json::array();
-  for (const InspectedPanel& panel : inspection.panels) panels.push_back(panel_json(panel));
+  nlohmann::ordered_json panels = std::vector<nlohmann::ordered_json>(inspection.panels.size());
+  for (const std::exception_ptr& error :
+       deal_out(panels.size(), threads, [&](std::size_t k) { panels[k] = panel_json(inspection.panels[k]); }))
+    if (error) std::rethrow_exception(error);
   nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
   for (const std::string& warning : inspection.warnings) warnings.push_back(utf8(warning));
   nlohmann::ordered_json refused = nlohmann::ordered_json::array();

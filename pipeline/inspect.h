@@ -22,6 +22,7 @@ struct InspectOptions {
   std::optional<int> degree;
   std::optional<double> span;  // m, largest span length
   std::optional<int> spans;    // per direction
+  int threads = 0;             // panels are dealt out to them, same results; 0: one for each core
 };
 
 // The face's surface, clamped, with these degrees and knots. Throws GeometryError where they can't be had.
@@ -57,7 +58,8 @@ nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger);
 
 // A table of the panels and their curves; `points`: with the constraint points one by one.
 std::string inspect_text(const Inspection& inspection, bool points = false);
-nlohmann::ordered_json inspect_json(const Inspection& inspection);  // the contract of design.md
+// The contract of design.md; threads as in InspectOptions.
+nlohmann::ordered_json inspect_json(const Inspection& inspection, int threads = 0);
 std::string inspect_svg(const Inspection& inspection);
 std::string inspect_png(const Inspection& inspection);   // the same drawing
 std::string inspect_html(const Inspection& inspection);  // a page of its own: the drawing, tables, warnings

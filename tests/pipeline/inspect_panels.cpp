@@ -146,6 +146,26 @@ TEST(Inspect, RefusesALoopThatCantBeClosed) {
   EXPECT_THROW(inspect(file), GeometryError);
 }
 
+TEST(Inspect, ThreadsAndTheirNumberDontShow) {
+  PanelFile file = flat_panel(true);
+  for (int k = 1; k < 40; ++k) {
+    file.panels.push_back(file.panels.front());
+    file.panels.back().name = "panel " + std::to_string(k);
+    if (k % 7 == 0) file.panels.back().loops.back().curves.pop_back();
+  }
+  InspectOptions options;
+  options.threads = 1;
+  const Inspection one = inspect(file, options);
+  EXPECT_EQ(one.refused.size(), 5u);
+  for (const int threads : {0, 2, 5, 64}) {
+    options.threads = threads;
+    const Inspection many = inspect(file, options);
+    EXPECT_EQ(many.refused, one.refused);
+    EXPECT_EQ(many.warnings, one.warnings);
+    EXPECT_EQ(inspect_json(many, threads).dump(), inspect_json(one, 1).dump());
+  }
+}
+
 TEST(Inspect, NamesInAnyEncodingBecomeJson) {
   PanelFile file = flat_panel(false);
   file.exporter = "caf\xe9";                 // Latin-1
