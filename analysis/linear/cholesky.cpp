@@ -1,34 +1,21 @@
 #include "analysis/linear/cholesky.h"
 
 #include <cholmod.h>
-#include <dlfcn.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
+#include "analysis/linear/supernodal_factor.h"
 #include "geometry/error.h"
 
 namespace toile {
 namespace {
 
-// An envelope whose rows are longer than this in mean square is slower than CHOLMOD (README, "Factor"): a square of
+// An envelope whose rows are longer than this in mean square is slower than supernodes (README, "Factor"): a square of
 // some 3,500 rows, a strip or several panels of any size.
 constexpr double longest_rows = 12000;
-
-// One thread in BLAS and none of OpenMP's in CHOLMOD, which asks for four in each factorisation and waits for them
-// longer than it computes.
-void single_blas_thread() {
-  using Setter = void (*)(int);
-  static const bool done = [] {
-    if (auto* set = reinterpret_cast<Setter>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"))) set(1);
-    if (auto* set = reinterpret_cast<Setter>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"))) set(0);
-    return true;
-  }();
-  (void)done;
-}
 
 // Neighbours of each row, without itself.
 std::vector<std::vector<int>> adjacency(const SparsePattern& pattern) {
@@ -229,99 +216,80 @@ class Envelope {
   mutable std::vector<double> work_;
 };
 
-class Cholmod {
+// Order and supernodes, by CHOLMOD and METIS.
+class Analysis {
  public:
-  explicit Cholmod(SparsePattern pattern) : pattern_(std::move(pattern)) {
-    single_blas_thread();
+  explicit Analysis(SparsePattern& pattern) {
     cholmod_start(&common_);
     common_.print = 0;
     common_.error_handler = nullptr;
-    common_.supernodal = CHOLMOD_AUTO;
-    common_.final_ll = 1;
+    common_.supernodal = CHOLMOD_SUPERNODAL;
     common_.nmethods = 1;
-    common_.method[0].ordering = CHOLMOD_AMD;
+    common_.method[0].ordering = CHOLMOD_METIS;
     common_.postorder = 1;
 
-    matrix_ = {};
-    matrix_.nrow = matrix_.ncol = static_cast<std::size_t>(pattern_.size());
-    matrix_.nzmax = pattern_.row.size();
-    matrix_.p = pattern_.column_start.data();
-    matrix_.i = pattern_.row.data();
-    matrix_.stype = -1;
-    matrix_.itype = CHOLMOD_INT;
-    matrix_.xtype = CHOLMOD_PATTERN;
-    matrix_.dtype = CHOLMOD_DOUBLE;
-    matrix_.sorted = matrix_.packed = 1;
-    factor_ = cholmod_analyze(&matrix_, &common_);
+    cholmod_sparse matrix = {};
+    matrix.nrow = matrix.ncol = static_cast<std::size_t>(pattern.size());
+    matrix.nzmax = pattern.row.size();
+    matrix.p = pattern.column_start.data();
+    matrix.i = pattern.row.data();
+    matrix.stype = -1;
+    matrix.itype = CHOLMOD_INT;
+    matrix.xtype = CHOLMOD_PATTERN;
+    matrix.dtype = CHOLMOD_DOUBLE;
+    matrix.sorted = matrix.packed = 1;
+    factor_ = cholmod_analyze(&matrix, &common_);
     if (!factor_) {
       cholmod_finish(&common_);
       throw SolverError("sparse factorisation: the pattern could not be analysed (out of memory?)");
     }
-    matrix_.xtype = CHOLMOD_REAL;
   }
-  Cholmod(const Cholmod&) = delete;
-  Cholmod& operator=(const Cholmod&) = delete;
-  ~Cholmod() {
-    cholmod_free_dense(&solution_, &common_);
-    cholmod_free_dense(&work_y_, &common_);
-    cholmod_free_dense(&work_e_, &common_);
+  Analysis(const Analysis&) = delete;
+  Analysis& operator=(const Analysis&) = delete;
+  ~Analysis() {
     cholmod_free_factor(&factor_, &common_);
     cholmod_finish(&common_);
   }
 
-  bool factorise(std::span<const double> values) {
-    matrix_.x = const_cast<double*>(values.data());
-    const bool ran = cholmod_factorize(&matrix_, factor_, &common_);
-    matrix_.x = nullptr;
-    return ran && common_.status == CHOLMOD_OK && factor_->minor == factor_->n;
+  SupernodalShape shape() const {
+    const auto list = [](const void* p, std::size_t n) {
+      return std::vector<int>(static_cast<const int*>(p), static_cast<const int*>(p) + n);
+    };
+    return {list(factor_->super, factor_->nsuper + 1), list(factor_->pi, factor_->nsuper + 1),
+            list(factor_->s, factor_->ssize), list(factor_->Perm, factor_->n)};
   }
-
-  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) {
-    cholmod_dense b = {};
-    b.nrow = b.nzmax = b.d = static_cast<std::size_t>(rhs.size());
-    b.ncol = 1;
-    b.x = const_cast<double*>(rhs.data());
-    b.xtype = CHOLMOD_REAL;
-    b.dtype = CHOLMOD_DOUBLE;
-    if (!cholmod_solve2(CHOLMOD_A, factor_, &b, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_))
-      throw SolverError("sparse factorisation: solving failed (out of memory?)");
-    std::copy_n(static_cast<const double*>(solution_->x), x.size(), x.data());
-  }
-
-  // From the column counts of the analysis; a supernodal factor holds some more.
-  std::size_t nonzeros() const {
-    const auto* counts = static_cast<const int*>(factor_->ColCount);
-    std::size_t sum = 0;
-    for (std::size_t c = 0; c < factor_->n; ++c) sum += static_cast<std::size_t>(counts[c]);
-    return sum;
-  }
-  double operations() const {
-    const auto* counts = static_cast<const int*>(factor_->ColCount);
-    return std::accumulate(counts, counts + factor_->n, 0.0, [](double sum, double count) { return sum + count * count; });
-  }
+  // Entries of each column of the factor.
+  std::span<const int> counts() const { return {static_cast<const int*>(factor_->ColCount), factor_->n}; }
 
  private:
-  SparsePattern pattern_;
   cholmod_common common_ = {};
-  cholmod_sparse matrix_ = {};
   cholmod_factor* factor_ = nullptr;
-  cholmod_dense *solution_ = nullptr, *work_y_ = nullptr, *work_e_ = nullptr;
 };
 
 }  // namespace
 
 struct Cholesky::Impl {
   std::unique_ptr<Envelope> envelope;
-  std::unique_ptr<Cholmod> cholmod;
-  std::size_t values = 0;
+  std::unique_ptr<SupernodalFactor> supernodal;
+  std::shared_ptr<Workers> workers;
+  std::size_t values = 0, nonzeros = 0;
+  double operations = 0;
 };
 
 Cholesky::Cholesky(SparsePattern pattern) : impl_(std::make_unique<Impl>()) {
   impl_->values = pattern.row.size();
-  if (EnvelopeShape shape(pattern); shape.mean_square_length() <= longest_rows)
+  if (EnvelopeShape shape(pattern); shape.mean_square_length() <= longest_rows) {
     impl_->envelope = std::make_unique<Envelope>(pattern, std::move(shape));
-  else
-    impl_->cholmod = std::make_unique<Cholmod>(std::move(pattern));
+    impl_->nonzeros = impl_->envelope->nonzeros();
+    impl_->operations = impl_->envelope->operations();
+    return;
+  }
+  const Analysis analysis(pattern);
+  for (const int count : analysis.counts()) {
+    impl_->nonzeros += static_cast<std::size_t>(count);
+    impl_->operations += static_cast<double>(count) * count;
+  }
+  impl_->supernodal = std::make_unique<SupernodalFactor>(analysis.shape(), pattern.column_start, pattern.row);
 }
 Cholesky::~Cholesky() = default;
 Cholesky::Cholesky(Cholesky&&) noexcept = default;
@@ -329,19 +297,24 @@ Cholesky& Cholesky::operator=(Cholesky&&) noexcept = default;
 
 bool Cholesky::factorise(std::span<const double> values) {
   assert(values.size() == impl_->values);
-  return impl_->envelope ? impl_->envelope->factorise(values) : impl_->cholmod->factorise(values);
+  return impl_->envelope ? impl_->envelope->factorise(values)
+                         : impl_->supernodal->factorise(values, impl_->workers.get());
 }
 
 void Cholesky::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) const {
-  impl_->envelope ? impl_->envelope->solve(rhs, x) : impl_->cholmod->solve(rhs, x);
+  impl_->envelope ? impl_->envelope->solve(rhs, x) : impl_->supernodal->solve(rhs, x, impl_->workers.get());
+}
+
+void Cholesky::use_threads(std::shared_ptr<Workers> workers) {
+  impl_->workers = std::move(workers);
 }
 
 std::size_t Cholesky::factor_nonzeros() const {
-  return impl_->envelope ? impl_->envelope->nonzeros() : impl_->cholmod->nonzeros();
+  return impl_->nonzeros;
 }
 
 double Cholesky::factor_operations() const {
-  return impl_->envelope ? impl_->envelope->operations() : impl_->cholmod->operations();
+  return impl_->operations;
 }
 
 }  // namespace toile

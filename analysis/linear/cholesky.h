@@ -1,11 +1,13 @@
 // Sparse symmetric positive definite systems with a fixed pattern, analysed once, refactored at will: by an envelope
-// where its rows are short, else by CHOLMOD.
+// where its rows are short, else by supernodes in nested dissection.
 #pragma once
 
 #include <Eigen/Core>
 #include <memory>
 #include <span>
 #include <vector>
+
+#include "analysis/workers.h"
 
 namespace toile {
 
@@ -25,6 +27,8 @@ class Cholesky {
   // Values in the order of the pattern. False where a pivot is not positive; the factor is then unusable.
   bool factorise(std::span<const double> values);
   void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) const;
+  // What supernodes do is dealt out to these, with the same bits.
+  void use_threads(std::shared_ptr<Workers> workers);
   std::size_t factor_nonzeros() const;
   double factor_operations() const;  // floating-point, of one factorisation
 

@@ -464,6 +464,7 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
 
 void FastProjection::use_threads(std::shared_ptr<Workers> workers) {
   impl_->parts.assign(workers ? static_cast<std::size_t>(workers->count()) : 1, {});
+  if (impl_->factor) impl_->factor->use_threads(workers);
   impl_->workers = std::move(workers);
 }
 
