@@ -14,8 +14,8 @@ namespace toile {
 namespace {
 
 // An envelope whose rows are longer than this in mean square is slower than supernodes (README, "Factor"): a square of
-// some 3,500 rows, a strip or several panels of any size.
-constexpr double longest_rows = 12000;
+// some 1,800 rows, a strip or several panels of any size.
+constexpr double longest_rows = 6000;
 
 // Neighbours of each row, without itself.
 std::vector<std::vector<int>> adjacency(const SparsePattern& pattern) {

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cstdlib>
+#include <limits>
+#include <memory>
 #include <random>
 
 #include "support/near.h"
@@ -44,7 +47,7 @@ double solve_error(Cholesky& factor, const System& s) {
   return (x - expected).cwiseAbs().maxCoeff();
 }
 
-// Both kinds of factor: small systems take the envelope, larger ones CHOLMOD.
+// Both kinds of factor: small systems take the envelope, larger ones supernodes.
 class CholeskyOfSize : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Sizes, CholeskyOfSize, ::testing::Values(4, 60, 300, 1100));
 
@@ -87,6 +90,65 @@ TEST_P(CholeskyOfSize, SameInputGivesTheSameBits) {
   a.solve(rhs, xa);
   b.solve(rhs, xb);
   EXPECT_EQ(xa, xb);
+}
+
+TEST_P(CholeskyOfSize, ThreadsAndTheirNumberDontShow) {
+  const System s = random_system(GetParam(), 4, 15);
+  const Eigen::VectorXd rhs = Eigen::VectorXd::LinSpaced(GetParam(), 1, 2);
+  const auto solution = [&](int threads) {
+    Cholesky factor(s.pattern);
+    if (threads > 1) factor.use_threads(std::make_shared<Workers>(threads));
+    EXPECT_TRUE(factor.factorise(s.values));
+    Eigen::VectorXd x(rhs.size());
+    factor.solve(rhs, x);
+    return x;
+  };
+  const Eigen::VectorXd one = solution(1);
+  for (const int threads : {2, 3, 7}) EXPECT_EQ(solution(threads), one) << threads;
+}
+
+TEST_P(CholeskyOfSize, NoNumberIsNotPositive) {
+  const System s = random_system(GetParam(), 3, 16);
+  Cholesky factor(s.pattern);
+  for (const std::size_t place : {std::size_t{0}, s.values.size() / 2, s.values.size() - 1}) {
+    std::vector<double> bad = s.values;
+    bad[place] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(factor.factorise(bad)) << place;
+  }
+}
+
+// Two unknowns at each point of a grid, each with its eight neighbours: subtrees, their ancestors, wide fronts.
+TEST(Cholesky, SolvesAGridByOneThreadAndThree) {
+  constexpr int side = 90, n = 2 * side * side;
+  std::mt19937 rng(17);
+  std::uniform_real_distribution<double> draw(-1, 1);
+  SparsePattern pattern;
+  std::vector<double> values;
+  pattern.column_start.push_back(0);
+  for (int c = 0; c < n; ++c) {
+    const int x = c / 2 % side, y = c / 2 / side;
+    for (int r = c; r < std::min(n, c + 2 * side + 6); ++r) {
+      if (std::abs(r / 2 % side - x) > 1 || r / 2 / side - y > 1) continue;
+      pattern.row.push_back(r);
+      values.push_back(r == c ? 18 : draw(rng));
+    }
+    pattern.column_start.push_back(static_cast<int>(pattern.row.size()));
+  }
+  const Eigen::VectorXd expected = Eigen::VectorXd::LinSpaced(n, -1, 2);
+  Eigen::VectorXd rhs = Eigen::VectorXd::Zero(n), one(n), three(n);
+  for (int c = 0; c < n; ++c)
+    for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
+      rhs[pattern.row[e]] += values[e] * expected[c];
+      if (pattern.row[e] != c) rhs[c] += values[e] * expected[pattern.row[e]];
+    }
+  Cholesky factor(pattern);
+  ASSERT_TRUE(factor.factorise(values));
+  factor.solve(rhs, one);
+  EXPECT_LT((one - expected).cwiseAbs().maxCoeff(), 1e-11);
+  factor.use_threads(std::make_shared<Workers>(3));
+  ASSERT_TRUE(factor.factorise(values));
+  factor.solve(rhs, three);
+  EXPECT_EQ(one, three);
 }
 
 }  // namespace
