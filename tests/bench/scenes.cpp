@@ -15,14 +15,13 @@ Build kidnapped(const std::filesystem::path& samples, const std::vector<std::str
   return build(read_scene(samples / "kidnapped_a" / "scene.toml", settings));
 }
 
-// Of several timings: what other programs on the machine took doesn't count.
+}  // namespace
+
 double median(std::vector<double> times) {
   const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
   std::nth_element(times.begin(), middle, times.end());
   return *middle;
 }
-
-}  // namespace
 
 std::vector<DrapeCost> kidnapped_by_step(const std::filesystem::path& samples,
                                          const std::vector<int>& steps_per_frame) {

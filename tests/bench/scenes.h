@@ -29,6 +29,9 @@ struct StepCost {
 };
 StepCost step_cost(const std::filesystem::path& samples, int per_direction, int threads = 1);
 
+// Of several timings: what other programs on the machine took doesn't count.
+double median(std::vector<double> times);
+
 // Slope of log(cost) over log(size) by least squares.
 double exponent(const std::vector<double>& size, const std::vector<double>& cost);
 
