@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/linear/pack.h"
 #include "analysis/linear/supernodal_factor.h"
 #include "geometry/error.h"
 
@@ -145,10 +146,7 @@ class Envelope {
   }
 
  private:
-  static constexpr int lanes = 8;
-  struct Pack {
-    double __attribute__((vector_size(lanes * sizeof(double)))) v;
-  };
+  static constexpr int lanes = pack_lanes;
 
   // sum over [0, count) of x_k coefficient(k), in a fixed order of four sums that don't wait for each other.
   template <class Coefficient>

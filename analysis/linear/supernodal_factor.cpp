@@ -2,10 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <atomic>
-#include <cstring>
 #include <queue>
 #include <utility>
+
+#include "analysis/linear/pack.h"
 
 namespace toile {
 namespace {
@@ -14,19 +14,6 @@ constexpr int group_count = 4;
 constexpr int together = 4;      // columns of a supernode in a solve, so that its rows are read a quarter as often
 constexpr int block = 48;        // columns of an update that one thread works out
 constexpr int wide = 4 * block;  // updates from here on are dealt out
-
-constexpr int lanes = 8;
-typedef double Pack __attribute__((vector_size(lanes * sizeof(double))));
-
-Pack load(const double* p) {
-  Pack out;
-  std::memcpy(&out, p, sizeof(out));
-  return out;
-}
-
-double sum(const Pack& p) {
-  return ((p[0] + p[1]) + (p[2] + p[3])) + ((p[4] + p[5]) + (p[6] + p[7]));
-}
 
 using Dense = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
@@ -269,9 +256,10 @@ void SupernodalFactor::backward(const Node& node, double* scratch) const {
       const double *l0 = column(j), *l1 = column(j + 1), *l2 = column(j + 2), *l3 = column(j + 3);
       Pack s0{}, s1{}, s2{}, s3{};
       int i = end;
-      for (; i + lanes <= rows; i += lanes) {
-        const Pack x = load(scratch + i);
-        s0 += load(l0 + i) * x, s1 += load(l1 + i) * x, s2 += load(l2 + i) * x, s3 += load(l3 + i) * x;
+      for (; i + pack_lanes <= rows; i += pack_lanes) {
+        const Pack x = load_pack(scratch + i);
+        s0.v += load_pack(l0 + i).v * x.v, s1.v += load_pack(l1 + i).v * x.v;
+        s2.v += load_pack(l2 + i).v * x.v, s3.v += load_pack(l3 + i).v * x.v;
       }
       double t0 = sum(s0), t1 = sum(s1), t2 = sum(s2), t3 = sum(s3);
       for (; i < rows; ++i) {
