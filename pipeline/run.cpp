@@ -55,8 +55,10 @@ class Loop {
       while (result_.exit == RunExit::ok && result_.state.t < *target && !over()) advance(*target);
       if (result_.exit != RunExit::ok) break;
       if (result_.state.t < *target) {
+        // Ends before its time. A run that goes on from here has no frame now.
+        result_.accepted = RunState(result_);
         if (result_.loop.done < result_.state.t) emit_frame();
-        finish_target(result_.state.t);
+        result_.loop.done = result_.state.t;
         break;
       }
       release(*target);

@@ -85,7 +85,8 @@ struct RunResult : RunState {
   std::string reason;  // why the run isn't ok: what, where, what to change
   double time = 0;
   std::unique_ptr<System> system;  // of the last state
-  // Where the solver failed: the run before the step that could not be made.
+  // What to go on from where that is not the end: before the step that the solver could not make, before the last frame
+  // of a run until rest.
   std::optional<RunState> accepted;
   // Of this process alone, which began at `from` [s].
   double from = 0;
