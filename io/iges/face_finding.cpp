@@ -148,38 +148,30 @@ std::vector<PlacedFace> find_faces(Reading& reading) {
   std::vector<PlacedFace> out;
   // What a definition, a shell or a solid holds appears where those put it.
   std::set<int> held;
-  const auto hold = [&](const Entry& e, auto&& members) {
-    try {
-      for (const int member : members()) {
-        held.insert(member);
-        // A group within a definition holds its members too.
-        const Entry* group = e.type == 308 ? reading.file.find(member) : nullptr;
-        if (!group || !is_group(*group)) continue;
-        Parameters in(reading.file, *group);
-        for (const int inner : read_group(in)) held.insert(inner);
-      }
-    } catch (const InputError& error) {
-      reading.quarantine(e, error.what());
+  const auto hold = [&](const std::vector<int>& members) { held.insert(members.begin(), members.end()); };
+  const auto read_holder = [&](const Entry& e) {
+    Parameters in(reading.file, e);
+    if (e.type == 186) return hold(sequences(read_solid(in).shells));
+    if (e.type == 514) return hold(sequences(read_shell(in).faces));
+    if (e.type == 402) {
+      read_group(in);
+      return reading.mark(e, Disposition::read);
+    }
+    for (const int member : read_definition(in).members) {
+      held.insert(member);
+      // A group within a definition holds its members too.
+      const Entry* group = reading.file.find(member);
+      if (!group || !is_group(*group)) continue;
+      Parameters of_group(reading.file, *group);
+      hold(read_group(of_group));
     }
   };
   for (const Entry& e : reading.file.entries) {
-    const auto reader = [&](auto&& read) {
-      return [&, read] {
-        Parameters in(reading.file, e);
-        return read(in);
-      };
-    };
-    if (e.type == 308) hold(e, reader([](Parameters& in) { return read_definition(in).members; }));
-    if (e.type == 186) hold(e, reader([](Parameters& in) { return sequences(read_solid(in).shells); }));
-    if (e.type == 514) hold(e, reader([](Parameters& in) { return sequences(read_shell(in).faces); }));
-    if (e.type == 402 && is_group(e)) {
-      try {
-        Parameters in(reading.file, e);
-        read_group(in);
-        reading.mark(e, Disposition::read);
-      } catch (const InputError& error) {
-        reading.quarantine(e, error.what());
-      }
+    if (e.type != 186 && e.type != 308 && e.type != 514 && !is_group(e)) continue;
+    try {
+      read_holder(e);
+    } catch (const InputError& error) {
+      reading.quarantine(e, error.what());
     }
   }
   for (const Entry& e : reading.file.entries) {
