@@ -229,7 +229,7 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule
   built.topology = trace_trims(built.face);
   close_seams(built, who, warnings);
   refuse_poles(built, who);
-  CutQuadrature rule = quadrature(built.face, built.topology);
+  CutQuadrature rule = quadrature(built.face, built.topology, shell_quadrature(built.face.surface));
   if (!(rule.area > 0)) throw GeometryError(who + ": the trim leaves no material");
   built.points = constraint_points(built.face, built.topology);
   built.extra_points = apply_rule(sampling, built.face, built.topology, built.points, built.closure);

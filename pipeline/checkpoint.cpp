@@ -16,7 +16,7 @@ namespace toile {
 namespace {
 
 constexpr std::string_view first_word = "toile checkpoint ";
-constexpr int format_number = 3;  // raise it when the meaning of a byte changes
+constexpr int format_number = 4;  // raise it when the meaning of a byte changes
 
 // Every step can be undone, so that a change of any one word always shows in the end.
 std::uint64_t checksum(std::string_view bytes) {
@@ -46,8 +46,12 @@ void fields(auto& archive, Like<ConstraintForces> auto& f) {
 void fields(auto& archive, Like<DynamicState> auto& s) {
   archive(s.t, s.x, s.v, s.a, s.constraint, s.q, s.f);
 }
+void fields(auto& archive, Like<StrainRange> auto& r) {
+  archive(r.least, r.largest);
+}
 void fields(auto& archive, Like<LoopState> auto& s) {
-  archive(s.assembled, s.done, s.dt_scale, s.steps_since_bound, s.bound_every, s.scale, s.balance, s.rounding, s.kick);
+  archive(s.assembled, s.done, s.dt_scale, s.calm, s.patience, s.steps_since_bound, s.bound_every, s.strain,
+          s.strain_at_bound, s.scale, s.balance, s.trough, s.rounding, s.kick);
 }
 void fields(auto& archive, Like<ShellModel::Cell> auto& c) {
   archive(c.panel, c.i, c.j);
@@ -195,7 +199,8 @@ std::string difference(const SceneMark& then, const SceneMark& now, const std::s
 SceneMark scene_mark(const Build& build) {
   SceneMark mark;
   for (const auto& [key, value] : build.scene.keys) {
-    const bool of_the_end = key == "solver.until" || key == "solver.time_limit" || key.starts_with("solver.rest");
+    const bool of_the_end = key == "solver.until" || key == "solver.time_limit" || key == "solver.energy_gain" ||
+                            key.starts_with("solver.rest");
     if (of_the_end || key == "output" || key.starts_with("output.")) continue;
     mark.keys[key] = value;
   }

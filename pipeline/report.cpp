@@ -140,9 +140,17 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
     report["stress"]["raw"]["second_pk"] = stress(m.raw_second_pk);
   }
   const EnergyBalance& e = run.energy;
-  report["energy"] = {{"kinetic", e.kinetic},      {"membrane", e.membrane},       {"bending", e.bending},
-                      {"limit", e.limit},          {"gravity", e.gravity},         {"dissipated", e.dissipated()},
-                      {"loads_work", e.load_work}, {"motion_work", e.motion_work}, {"injected", e.injected}};
+  report["energy"] = {{"kinetic", e.kinetic},
+                      {"membrane", e.membrane},
+                      {"bending", e.bending},
+                      {"limit", e.limit},
+                      {"gravity", e.gravity},
+                      {"dissipated", e.dissipated()},
+                      {"dissipated_by_drag", -e.drag_work},
+                      {"dissipated_by_steps", e.numerical()},
+                      {"loads_work", e.load_work},
+                      {"motion_work", e.motion_work},
+                      {"injected", e.injected}};
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
                           {"iterations_max", run.iterations_max},
                           {"gram_nonzeros", system.projection ? system.projection->gram_nonzeros() : 0},

@@ -15,13 +15,18 @@ namespace {
 constexpr double step_safety = 0.9;   // of the eigenvalue bound
 constexpr int bound_every = 100;      // steps; the bound costs some 25 forces
 constexpr int bound_rarely = 400;     // steps
+constexpr int most_patience = 10000;  // steps
 constexpr double bound_holds = 0.01;  // change of the step, from one bound to the next, far less than the safety takes
+constexpr double stiffening = 0.2;    // of the cloth since the last bound: nearly what the safety takes
 // A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the
 // plan.
 constexpr double damped_scale = 0.8, smallest_damped = 0.25;
-constexpr double rest_share = 1e-4;                   // of the largest panel, of the tolerance of rest
-constexpr double smallest_scale = 1.0 / 1024;         // ten halvings of the planned step
-constexpr double step_rise = 0.05, total_rise = 0.2;  // of the energy turned over
+constexpr double rest_share = 1e-4;            // of the largest panel, of the tolerance of rest
+constexpr double smallest_scale = 1.0 / 1024;  // ten halvings of the planned step
+// Of the energy turned over: in a step and in all. A step that the bound chooses is made smaller for less, down to a
+// share of it, unless the limit is hard, which leaves more in smaller ones.
+constexpr double step_rise = 0.05, total_rise = 0.2;
+constexpr double small_rise = 0.005, smallest_careful = 1.0 / 16;
 
 // Kinetic energy that nobody sees: of cloth that would cross its own distance from the origin in 1e8 s, or that moves
 // by the rounding of its places in a step. Without loads there is nothing else to compare a rise with.
@@ -29,6 +34,12 @@ double rounding_energy(const DynamicSystem& system, const Eigen::VectorXd& q, do
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const double speed = q.lpNorm<Eigen::Infinity>() * (1e-8 + (dt > 0 ? 64 * epsilon / dt : 0));
   return 0.5 * system.node_mass.sum() * speed * speed;
+}
+
+// The membrane's tangent grows like 1 + 3 E in tension; squeezed cloth bends more stiffly, per length 1 + 2 E.
+bool stiffer(const StrainRange& now, const StrainRange& before) {
+  return 1 + 3 * now.largest > (1 + stiffening) * (1 + 3 * before.largest) ||
+         1 + 2 * now.least < (1 - stiffening) * (1 + 2 * before.least);
 }
 
 class Loop {
@@ -67,13 +78,13 @@ class Loop {
     }
     if (result_.exit == RunExit::ok && !result_.last_projection.converged) report_limit();
     if (result_.exit == RunExit::ok && scene_.rest && !at_rest()) report_unrest();
+    if (result_.exit == RunExit::ok) check_energy();
     result_.time = result_.state.t;
     const Eigen::VectorXd moved = control_points(*result_.system, result_.state) - build_.start;
     result_.energy.gravity = 0;
     for (int i = 0; i < build_.model->control_point_count(); ++i) {
       result_.energy.gravity -= build_.model->lumped_mass()[i] * scene_.gravity.dot(moved.segment<3>(3 * i));
     }
-    warn_of_injected_energy();
     result_.wall_seconds = since(start_);
     return std::move(result_);
   }
@@ -95,7 +106,9 @@ class Loop {
     result_.energy.limit = limit_energy();
     result_.energy.start = result_.energy.elastic();
     result_.loop.scale = result_.energy.start;
+    result_.loop.strain = {elastic.least_strain, elastic.largest_strain};
     evaluate_bound();
+    if (scene_.dt) hold_to_bound();
     result_.loop.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
   }
 
@@ -162,8 +175,8 @@ class Loop {
     const int kept = loop.bound_every;
     loop.steps_since_bound = 0;
     loop.bound_every = bound_every;
-    loop.dt_scale = std::min(1.0, 2 * loop.dt_scale);
-    if (scene_.dt) return;
+    loop.strain_at_bound = loop.strain;
+    if (!bounded()) return;
     const Clock::time_point start = Clock::now();
     const long asked = allocations();
     const System& system = *result_.system;
@@ -172,6 +185,27 @@ class Loop {
       loop.bound_every = std::min(2 * kept, bound_rarely);
     result_.bound_seconds += since(start);
     result_.allocations.bound += allocations() - asked;
+  }
+
+  bool hard_limit() const {
+    const StrainLimit& limit = scene_.strain_limit;
+    return limit.on && (limit.solver == LimitSolver::lagrange || limit.variant == ProjectionVariant::paper);
+  }
+  // A step that the scene names is held to the bound once it has proved too large.
+  bool bounded() const { return !scene_.dt || result_.bound.dt > 0; }
+  double largest_step() const {
+    const double planned = planned_step(scene_, result_.bound);
+    return scene_.dt && bounded() ? std::min(planned, step_safety * result_.bound.dt) : planned;
+  }
+  void hold_to_bound() {
+    const TimeStepBound bound = bound_of(*result_.system);
+    if (!(*scene_.dt > bound.dt)) return;
+    result_.bound = bound;
+    result_.warnings.push_back(fmt::format(
+        "solver.dt = {:.3g} s is more than is stable: {:.3g} s at t = {:.3g} s, by {} in {}; from then on the "
+        "steps are smaller",
+        *scene_.dt, result_.bound.dt, result_.state.t, result_.bound.bending ? "bending" : "membrane",
+        describe_cell(build_, result_.bound.cell)));
   }
 
   TimeStepBound bound_of(const System& system) const {
@@ -183,7 +217,7 @@ class Loop {
   }
   void advance(double target) {
     if (result_.loop.steps_since_bound >= result_.loop.bound_every) evaluate_bound();
-    double largest = result_.loop.dt_scale * planned_step(scene_, result_.bound);
+    double largest = result_.loop.dt_scale * largest_step();
     if (!scene_.dt) largest *= result_.relaxation.dt_share;
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
@@ -206,17 +240,20 @@ class Loop {
         if (scene_.rest) relax_after(report);
         // The last step of a stretch ends on the target itself, not on a rounded sum.
         if (count == 1 && !halved) result_.state.t = target;
-        if (halved) result_.loop.steps_since_bound = 0;
         break;
       }
       if (report.finite) std::swap(result_.state, work_.other);
       if (!halved) result_.accepted = RunState(result_);
+      if (!bounded()) hold_to_bound();
       ++result_.redone_steps;
+      result_.loop.calm = 0;
+      result_.loop.trough = result_.loop.balance;
+      if (!halved) result_.loop.patience = std::min(2 * result_.loop.patience, most_patience);
       if (result_.loop.dt_scale <= smallest_scale) {
         fail(fmt::format("{}, even with a step of {:.3g} s", trouble, dt));
         return;
       }
-      dt /= 2;
+      dt = std::min(dt / 2, largest_step());
       result_.loop.dt_scale /= 2;
     }
     if (hooks_.progress) hooks_.progress({result_.state.t, scene_.until, dt, result_.steps, result_.frames});
@@ -235,6 +272,7 @@ class Loop {
     if (relax(result_.system->dynamic, work_, report, tolerance_, result_.state, relaxation)) {
       result_.energy.kinetic = 0;
       result_.loop.balance -= report.kinetic;
+      result_.loop.trough = result_.loop.balance;
     }
     if (result_.state.t < pins_done_) restart(relaxation);
   }
@@ -251,20 +289,17 @@ class Loop {
         result_.relaxation.steps, unrest(), tolerance_);
   }
 
-  // Less than what ends a run, but more than a stable one should gain.
-  void warn_of_injected_energy() {
-    constexpr double noticeable = 0.01;
-    constexpr std::string_view start = "the energy rose by";
-    // A run that is taken up again judges anew.
-    std::erase_if(result_.warnings, [&](const std::string& warning) { return warning.starts_with(start); });
-    if (result_.exit == RunExit::interrupted || result_.exit == RunExit::time_limit) return;
+  // Less than what ends a run, but more than a stable one gains.
+  void check_energy() {
     const EnergyBalance& e = result_.energy;
     const double turned = std::max({std::abs(e.load_work), std::abs(e.motion_work), e.start});
-    if (!(e.injected > noticeable * turned) || !(e.injected > result_.loop.rounding)) return;
-    result_.warnings.push_back(
-        fmt::format("{} {:.2g} % of what was turned over without work that would explain it: a smaller dt "
-                    "or a lower strain_limit.stiffness is more accurate",
-                    start, 100 * e.injected / turned));
+    if (!(e.injected > scene_.energy_gain * turned) || !(e.injected > result_.loop.rounding)) return;
+    result_.exit = RunExit::check_failed;
+    result_.reason = fmt::format(
+        "the energy rose by {:.2g} % of what was turned over without work that would explain it, allowed are {:.2g} % "
+        "(solver.energy_gain){}: a smaller dt or a lower strain_limit.stiffness is more accurate",
+        100 * e.injected / turned, 100 * scene_.energy_gain,
+        scene_.strain_limit.on ? "" : "; cloth that is squeezed to nothing gains too, which a strain limit prevents");
   }
 
   // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest /
@@ -290,10 +325,11 @@ class Loop {
     const double turned = std::max({result_.loop.scale, std::abs(e.load_work + report.load_work),
                                     std::abs(e.motion_work + report.motion_work), std::abs(e.drag_work), e.now()});
     const double smaller_step = report.dt < (1 - 1e-9) * result_.dt_last ? result_.loop.kick : 0;
-    if (balance - result_.loop.balance > step_rise * turned + smaller_step + result_.loop.rounding) {
-      return fmt::format(
-          "the energy rises by {:.3g} J in a step without work that would explain it ({:.3g} J turned over)",
-          balance - result_.loop.balance, turned);
+    const bool careful = bounded() && !hard_limit() && result_.loop.dt_scale > smallest_careful;
+    const double rise = balance - (careful ? result_.loop.trough : result_.loop.balance);
+    if (rise > (careful ? small_rise : step_rise) * turned + smaller_step + result_.loop.rounding) {
+      return fmt::format("the energy rises by {:.3g} J without work that would explain it ({:.3g} J turned over)", rise,
+                         turned);
     }
     // What the end of the step holds can't exceed the budget either.
     const double stored = report.kinetic_end + elastic - e.start - e.load_work - e.drag_work - e.motion_work -
@@ -305,6 +341,7 @@ class Loop {
     result_.loop.scale = turned;
     result_.loop.kick = report.kick;
     result_.loop.balance = balance;
+    result_.loop.trough = std::min(result_.loop.trough, balance);
     return {};
   }
 
@@ -328,8 +365,16 @@ class Loop {
     if (!scene_.dt && report.projection.damped && result_.loop.dt_scale > smallest_damped) {
       result_.loop.dt_scale = std::max(smallest_damped, damped_scale * result_.loop.dt_scale);
     }
+    // Larger again, but each time that this proved too early later.
+    if (++result_.loop.calm >= result_.loop.patience) {
+      result_.loop.calm = 0;
+      result_.loop.dt_scale = std::min(1.0, 2 * result_.loop.dt_scale);
+    }
     ++result_.steps;
     ++result_.loop.steps_since_bound;
+    result_.loop.strain = {report.elastic.least_strain, report.elastic.largest_strain};
+    if (stiffer(result_.loop.strain, result_.loop.strain_at_bound))
+      result_.loop.steps_since_bound = result_.loop.bound_every;
   }
 
   void release(double t) {
@@ -390,8 +435,10 @@ class Loop {
     if (p.strain_violation > scene_.strain_limit.tolerance)
       where += fmt::format("; the strain limit is broken by {:.3g} {}", p.strain_violation, worst_place());
     if (p.place_violation > 1e-6) where += fmt::format("; a pin is missed by {:.3g} m", p.place_violation);
-    std::string advice = scene_.dt ? "Use dt = \"auto\" or a smaller dt" : "Use a smaller dt";
     const StrainLimit& limit = scene_.strain_limit;
+    std::string advice = hard_limit() ? "Use the default solver and variant, whose limit yields"
+                         : scene_.dt  ? "Use dt = \"auto\" or a smaller dt"
+                                      : "Use a smaller dt";
     if (limit.on) {
       for (std::size_t k = 0; limit.stiffness && k < build_.panels.size(); ++k) {
         if (*limit.stiffness > default_limit_stiffness(build_, static_cast<int>(k))) {

@@ -41,8 +41,13 @@ struct EnergyBalance {
   double injected = 0;  // J, largest rise of the balance above the start, 0 where it never rose
   double elastic() const { return membrane + bending + limit; }
   double now() const { return kinetic + elastic(); }
-  // What drag and projection took.
+  // What drag took, and with it the step: damping by the strain limit, or less than nothing where energy rose.
   double dissipated() const { return start + load_work + motion_work - now(); }
+  double numerical() const { return dissipated() + drag_work; }
+};
+
+struct StrainRange {
+  double least = 0, largest = 0;  // of ShellEnergy
 };
 
 // What the step loop carries from step to step besides the state of the cloth.
@@ -50,8 +55,11 @@ struct LoopState {
   double assembled = 0;                        // s, time whose pins hold
   double done = -1;                            // s, last frame or release time that is dealt with; none at first
   double dt_scale = 1;                         // of the planned step
+  int calm = 0, patience = 100;                // steps since one was refused or the scale rose; until it rises
   int steps_since_bound = 0, bound_every = 0;  // steps
+  StrainRange strain, strain_at_bound;         // now, and when the bound was asked for
   double scale = 0, balance = 0;               // J, energy turned over; unexplained rise
+  double trough = 0;                           // J, lowest balance since a step was refused
   double rounding = 0;                         // J, that nobody sees
   double kick = 0;                             // J, of the last accepted step: what a smaller step may seem to gain
 };
@@ -107,8 +115,9 @@ struct RunHooks {
 double rest_tolerance(const Build& build);
 
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
-// state, evaluated anew every 100 steps, and less often, up to every 400, where it hardly changes; where the
-// projection had to damp, less.
+// state, evaluated anew every 100 steps, and less often, up to every 400, where it hardly changes, at once where cloth
+// is stretched or squeezed so far that it is stiffer by a tenth; where the projection had to damp, less. A `dt` of the
+// scene that is more than the bound at the start, or proves too large, is held to the bound likewise.
 //   (1) every number of an accepted step is finite;
 //   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from
 //   step

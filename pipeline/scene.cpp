@@ -494,6 +494,7 @@ void read_solver(Table table, Scene& scene) {
     if (const auto n = rest->integer("max_steps", 1, 1000000000)) scene.rest->max_steps = *n;
     rest->done();
   }
+  table.number(scene.energy_gain, "energy_gain", dimension::none, Range::positive);
   scene.time_limit = table.number("time_limit", dimension::time, Range::positive);
   table.done();
 }

@@ -128,6 +128,7 @@ struct Scene {
   Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
   Eigen::Vector3d wind{0, 0, 0};         // m/s
   std::optional<double> dt;              // s; unset: chosen from the eigenvalue bound
+  double energy_gain = 0.01;             // unexplained rise of the energy, of what was turned over, that a run may have
   double until = 1;                      // s; infinite where `rest` ends the run
   std::optional<SceneRest> rest;         // set: until the cloth is at rest
   std::optional<double> time_limit;      // s of wall time for the program; unset: none

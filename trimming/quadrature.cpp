@@ -494,6 +494,13 @@ CutCellRule::Result CutCellRule::build(CellBoundary& boundary, int degree_x, int
   return result;
 }
 
+// Of each knot line, whether functions are C1 there; no border is.
+std::vector<char> smooth_lines(const KnotVector& knots, const std::vector<double>& lines) {
+  std::vector<char> smooth(lines.size(), false);
+  for (std::size_t k = 1; k + 1 < lines.size(); ++k) smooth[k] = knots.multiplicity(lines[k]) < knots.degree();
+  return smooth;
+}
+
 }  // namespace
 
 CutQuadrature quadrature(const TrimmedSurface& surface, const TrimTopology& topology,
@@ -501,8 +508,17 @@ CutQuadrature quadrature(const TrimmedSurface& surface, const TrimTopology& topo
   const KnotMesh& mesh = topology.mesh;
   const int degree_u = options.degree_u.value_or(2 * surface.surface.u().degree());
   const int degree_v = options.degree_v.value_or(2 * surface.surface.v().degree());
-  const GaussRule& gauss_u = gauss_rule(options.gauss_u.value_or(surface.surface.u().degree() + 1));
-  const GaussRule& gauss_v = gauss_rule(options.gauss_v.value_or(surface.surface.v().degree() + 1));
+  const int most_u = options.gauss_u.value_or(surface.surface.u().degree() + 1);
+  const int most_v = options.gauss_v.value_or(surface.surface.v().degree() + 1);
+  const std::vector<char> smooth_u = smooth_lines(surface.surface.u(), mesh.u);
+  const std::vector<char> smooth_v = smooth_lines(surface.surface.v(), mesh.v);
+  // Does cloth go on from cell k of a row over the line at its end into an uncut cell that is at least half as long?
+  const auto goes_on = [](const std::vector<double>& lines, const std::vector<char>& smooth, int k, int end,
+                          const auto& kind) {
+    const int next = k + (end == 0 ? -1 : 1);
+    return smooth[k + end] && kind(next) == CellKind::inside &&
+           lines[next + 1] - lines[next] >= 0.5 * (lines[k + 1] - lines[k]);
+  };
   CutQuadrature result;
   CutCellRule rule;
   CellBoundary boundary;
@@ -515,6 +531,14 @@ CutQuadrature quadrature(const TrimmedSurface& surface, const TrimTopology& topo
       const double width = mesh.u[i + 1] - mesh.u[i], height = mesh.v[j + 1] - mesh.v[j];
       CellRule cell{.i = i, .j = j, .first = static_cast<int>(result.points.size())};
       if (kind == CellKind::inside) {
+        const auto along_u = [&](int k) { return topology.cells[mesh.cell(k, j)]; };
+        const auto along_v = [&](int k) { return topology.cells[mesh.cell(i, k)]; };
+        const bool less_u =
+            options.one_less && (goes_on(mesh.u, smooth_u, i, 0, along_u) || goes_on(mesh.u, smooth_u, i, 1, along_u));
+        const bool less_v =
+            options.one_less && (goes_on(mesh.v, smooth_v, j, 0, along_v) || goes_on(mesh.v, smooth_v, j, 1, along_v));
+        const GaussRule& gauss_u = gauss_rule(std::max(1, most_u - less_u));
+        const GaussRule& gauss_v = gauss_rule(std::max(1, most_v - less_v));
         cell.tensor = true;
         cell.area = width * height;
         for (int b = 0; b < gauss_v.size(); ++b)

@@ -19,7 +19,7 @@ struct CellRule {
 };
 
 //   (1) every point lies in the material of its cell; every weight is positive;
-//   (2) uncut cells: (p_u + 1) x (p_v + 1) Gauss points;
+//   (2) uncut cells: (p_u + 1) x (p_v + 1) Gauss points, fewer where asked;
 //   (3) cut cells: u^a v^b integrated exactly for a <= degree_u, b <= degree_v (relative 1e-12 of the cell's moments
 //       for polynomial trims; rational trims to rounding) with at most (degree_u + 1)(degree_v + 1) points;
 //   (4) cells ordered by mesh.cell.
@@ -34,6 +34,9 @@ struct CutQuadrature {
 struct QuadratureOptions {
   std::optional<int> degree_u, degree_v;  // exactness on cut cells; unset: twice the surface's degree
   std::optional<int> gauss_u, gauss_v;    // points per direction on uncut cells; unset: degree + 1
+  // One point less in a direction in which the functions go on smoothly (C1) into another uncut cell, at least half as
+  // long. A cell for itself has more functions than that, and some would move without being seen.
+  bool one_less = false;
 };
 CutQuadrature quadrature(const TrimmedSurface& surface, const TrimTopology& topology, const QuadratureOptions& = {});
 

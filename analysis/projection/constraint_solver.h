@@ -68,8 +68,8 @@ class ConstraintSolver {
   virtual ProjectionMemory memory() const = 0;
   virtual bool restore(const ProjectionMemory& memory) = 0;
 
-  // Steps by these threads from now on: the same bits. Null: the caller's alone, which is all that some solvers use.
-  virtual void use_threads(std::shared_ptr<Workers> workers) { (void)workers; }
+  // Steps by these threads from now on: the same bits. Null: the caller's alone.
+  virtual void use_threads(std::shared_ptr<Workers> workers) = 0;
 
   virtual const ConstraintRows& rows() const = 0;
   virtual std::size_t factor_nonzeros() const = 0;

@@ -79,6 +79,7 @@ struct LagrangeNewton::Impl {
   double first_strain = 0;                          // largest |C| of the candidate
   ProjectionMemory memory;
   std::unique_ptr<FastProjection> projection;  // made where Newton's method fails first
+  std::shared_ptr<Workers> workers;            // of the factor and the projection; null: one thread
 
   Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, ConstraintRows r, const ProjectionOptions& o)
       : map(m),
@@ -241,7 +242,10 @@ void LagrangeNewton::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionRepo
 
 // The candidate's projection instead.
 void LagrangeNewton::Impl::project(Eigen::Ref<Eigen::VectorXd> x, double t, ProjectionReport& report) {
-  if (!projection) projection = std::make_unique<FastProjection>(map, mass, rows, options);
+  if (!projection) {
+    projection = std::make_unique<FastProjection>(map, mass, rows, options);
+    projection->use_threads(workers);
+  }
   x = candidate;
   const ProjectionReport instead = projection->project(x, t);
   memory = projection->memory();
@@ -332,6 +336,11 @@ bool LagrangeNewton::restore(const ProjectionMemory& memory) {
     return false;
   now = memory;
   return true;
+}
+void LagrangeNewton::use_threads(std::shared_ptr<Workers> workers) {
+  if (impl_->factor) impl_->factor->use_threads(workers);
+  if (impl_->projection) impl_->projection->use_threads(workers);
+  impl_->workers = std::move(workers);
 }
 const ConstraintRows& LagrangeNewton::rows() const {
   return impl_->rows;

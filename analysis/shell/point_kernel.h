@@ -8,6 +8,9 @@
 //   E11, E22, g12 Green-Lagrange strain, g12 = 2 E12 = x1.x2                          [eq. 3]
 //   kappa_ab      a3 . x_ab                                                           [eq. 4]
 //   S, m          stress resultants S = k E and moments                               [eqs. 8, 9]
+//   guard         energy of cloth squeezed below `crush` of its area, where it bends: b (1 - s)^2 / (2 s), s = j /
+//   crush.
+//                 Law (8) resists less and less from a length of 1/sqrt(3) on, and without area there is no normal.
 //
 // The gradients below are eqs. (13) and (15) summed over their moments first: with M = sum m_ab x_ab and
 // t = (M - (M.a3) a3) / j, the variation of sum m_ab kappa_ab is sum m_ab a3 . dx_ab + (x2 x t) . dx1 + (t x x1) . dx2.
@@ -43,6 +46,8 @@ inline Vec3<Real> cross(const Vec3<Real>& a, const Vec3<Real>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+constexpr double crush = 0.5773502691896258;  // 1/sqrt(3)
+
 // A fabric's laws as the kernels read them; parts that carry nothing are skipped.
 struct PointLaw {
   explicit PointLaw(const Fabric& fabric)
@@ -50,10 +55,12 @@ struct PointLaw {
         warp(fabric.membrane.warp),
         shear(fabric.membrane.shear),
         twist(fabric.bending.twist),
+        guard(std::max(weft, warp)),
         membrane(weft > 0 || warp > 0 || shear > 0),
         weft_warp_bending(fabric.bending.b0 > 0),
         bending(fabric.bending) {}
   double weft, warp, shear, twist;
+  double guard;  // N/m, b
   bool membrane, weft_warp_bending;
   BendingLaw bending;
   bool bends() const { return weft_warp_bending || twist > 0; }
@@ -74,31 +81,57 @@ struct Curvature {
 template <class Real>
 struct SurfaceNormal {
   Vec3<Real> a3;
-  Real inverse_j;
+  Real j, inverse_j;
 };
 template <class Real>
 inline SurfaceNormal<Real> surface_normal(const PointJet<Real>& x) {
   const Vec3<Real> n = cross(x.x1, x.x2);
-  const Real inverse_j = 1.0 / sqrt(dot(n, n));
-  return {inverse_j * n, inverse_j};
+  const Real j2 = dot(n, n), inverse_j = 1.0 / sqrt(j2);
+  return {inverse_j * n, j2 * inverse_j, inverse_j};
 }
 
+// Of the guard, with respect to j.
+template <class Real>
+struct GuardTerms {
+  Real energy, slope, curvature;
+};
+template <class Real>
+inline GuardTerms<Real> guard(const PointLaw& law, const SurfaceNormal<Real>& n) {
+  const Real zero = broadcast<Real>(0), s = (1 / crush) * n.j, inverse = crush * n.inverse_j;
+  const auto squeezed = s < 1.0;
+  const double b = law.guard;
+  return {select(squeezed, 0.5 * b * (s - 2.0 + inverse), zero),
+          select(squeezed, 0.5 * b / crush * (1.0 - inverse * inverse), zero),
+          select(squeezed, b / (crush * crush) * inverse * inverse * inverse, zero)};
+}
+
+// Energies, or parts of a quadratic form, and where they are energies the least and largest of E11 and E22.
 template <class Real>
 struct PointEnergy {
-  Real membrane, bending;
+  Real membrane, bending, least, most;
 };
+template <class Real>
+inline Real smaller(Real a, Real b) {
+  return select(b < a, b, a);
+}
+template <class Real>
+inline Real larger(Real a, Real b) {
+  return select(b > a, b, a);
+}
 
 // Energy per rest area at x and its gradient g. Needs x1 and x2 independent.
 template <class Real>
 inline PointEnergy<Real> energy_gradient(const PointLaw& law, const PointJet<Real>& x, const Curvature<Real>& rest,
                                          PointJet<Real>& g) {
-  PointEnergy<Real> energy{broadcast<Real>(0), broadcast<Real>(0)};
+  PointEnergy<Real> energy{};
   const Vec3<Real> zero{energy.membrane, energy.membrane, energy.membrane};
   g.x1 = g.x2 = g.x11 = g.x22 = g.x12 = zero;
   if (law.membrane) {
     const Real E11 = 0.5 * (dot(x.x1, x.x1) - 1.0), E22 = 0.5 * (dot(x.x2, x.x2) - 1.0), g12 = dot(x.x1, x.x2);
     const Real S11 = law.weft * E11, S22 = law.warp * E22, S12 = law.shear * g12;
     energy.membrane = 0.5 * (S11 * E11 + S22 * E22 + S12 * g12);
+    energy.least = smaller(E11, E22);
+    energy.most = larger(E11, E22);
     g.x1 = S11 * x.x1 + S12 * x.x2;
     g.x2 = S22 * x.x2 + S12 * x.x1;
   }
@@ -119,7 +152,9 @@ inline PointEnergy<Real> energy_gradient(const PointLaw& law, const PointJet<Rea
       M = M + m12 * x.x12;
       g.x12 = m12 * n.a3;
     }
-    const Vec3<Real> t = n.inverse_j * (M - dot(M, n.a3) * n.a3);
+    const GuardTerms<Real> held = guard(law, n);
+    energy.membrane += held.energy;
+    const Vec3<Real> t = n.inverse_j * (M - dot(M, n.a3) * n.a3) + held.slope * n.a3;
     g.x1 = g.x1 + cross(x.x2, t);
     g.x2 = g.x2 + cross(t, x.x1);
   }
@@ -130,7 +165,7 @@ inline PointEnergy<Real> energy_gradient(const PointLaw& law, const PointJet<Rea
 template <class Real>
 inline PointEnergy<Real> energy_hessian(const PointLaw& law, TangentKind kind, const PointJet<Real>& x,
                                         const Curvature<Real>& rest, const PointJet<Real>& dx, PointJet<Real>& dg) {
-  PointEnergy<Real> work{broadcast<Real>(0), broadcast<Real>(0)};
+  PointEnergy<Real> work{};
   const Vec3<Real> zero{work.membrane, work.membrane, work.membrane};
   dg.x1 = dg.x2 = dg.x11 = dg.x22 = dg.x12 = zero;
   if (law.membrane) {
@@ -175,8 +210,13 @@ inline PointEnergy<Real> energy_hessian(const PointLaw& law, TangentKind kind, c
       add(m12, 2.0 * law.twist * (dot(n.a3, dx.x12) + dot(da3, x.x12)), x.x12, dx.x12, dg.x12);
     }
     const Real along = dot(M, n.a3);
-    const Vec3<Real> t = n.inverse_j * (M - along * n.a3);
-    const Vec3<Real> dt = n.inverse_j * (dM - (dot(dM, n.a3) + dot(M, da3)) * n.a3 - along * da3 - dj * t);
+    const Vec3<Real> bent = n.inverse_j * (M - along * n.a3);
+    // The guard's slope is negative, and so is what it subtracts where the normal turns.
+    const GuardTerms<Real> held = guard(law, n);
+    Vec3<Real> dt = n.inverse_j * (dM - (dot(dM, n.a3) + dot(M, da3)) * n.a3 - along * da3 - dj * bent) +
+                    (held.curvature * dj) * n.a3;
+    if (kind == TangentKind::exact) dt = dt + held.slope * da3;
+    const Vec3<Real> t = bent + held.slope * n.a3;
     const Vec3<Real> b1 = cross(dx.x2, t) + cross(x.x2, dt), b2 = cross(dt, x.x1) + cross(t, dx.x1);
     work.bending = dot(dx.x1, b1) + dot(dx.x2, b2) + dot(dx.x11, dg.x11) + dot(dx.x22, dg.x22);
     if (law.twists()) work.bending += dot(dx.x12, dg.x12);

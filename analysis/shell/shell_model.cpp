@@ -306,6 +306,8 @@ void sweep(const CellGroup& group, const PanelLayout& layout, const Pack* table,
     const PointEnergy<Lanes> energy = energy_gradient(layout.law, jets[0], header.rest, g);
     total.membrane += header.weight * energy.membrane;
     total.bending += header.weight * energy.bending;
+    total.least = smaller(total.least, energy.least);
+    total.most = larger(total.most, energy.most);
     return g;
   });
   return total;
@@ -424,6 +426,8 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& i
   const auto add = [&](const PointEnergy<Lanes>& part) {
     total.membrane += part.membrane;
     total.bending += part.bending;
+    total.least = smaller(total.least, part.least);
+    total.most = larger(total.most, part.most);
   };
   if (!work) {
     for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
@@ -568,6 +572,14 @@ void ShellModel::Impl::fill(CellGroup& group) {
   }
 }
 
+QuadratureOptions shell_quadrature(const NurbsSurface& surface) {
+  QuadratureOptions options;
+  options.one_less = !surface.rational();
+  options.degree_u = 2 * surface.u().degree() - options.one_less;
+  options.degree_v = 2 * surface.v().degree() - options.one_less;
+  return options;
+}
+
 ShellModel::ShellModel(std::vector<ShellPanel> panels) : impl_(std::make_unique<Impl>()) {
   impl_->panels = std::move(panels);
   impl_->first.push_back(0);
@@ -639,7 +651,12 @@ ShellEnergy ShellModel::internal_force(const Eigen::Ref<const Eigen::VectorXd>& 
   double strips = 0;
   for (const KinkStrip& strip : impl_->kinks)
     strips += add_kink_force(strip, impl_->layouts[strip.panel].law, q.data(), force.data());
-  return {sum(total.membrane), sum(total.bending) + strips};
+  ShellEnergy energy{sum(total.membrane), sum(total.bending) + strips};
+  for (int l = 0; l < lane_count; ++l) {
+    energy.least_strain = std::min(energy.least_strain, total.least[l]);
+    energy.largest_strain = std::max(energy.largest_strain, total.most[l]);
+  }
+  return energy;
 }
 
 void ShellModel::apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,

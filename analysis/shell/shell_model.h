@@ -34,8 +34,14 @@ struct ShellPanel {
   std::vector<KinkPoint> kinks = {};
 };
 
+// Quadrature that the shell asks for: p points a direction. What it integrates exactly (2 p - 1 in each direction)
+// keeps the order of convergence, no motion that full quadrature sees goes unseen, and p = 2 takes less than half as
+// long. Rational functions take p + 1. [Strang & Fix 1973, 4.3; analysis/README.md, "Quadrature"]
+QuadratureOptions shell_quadrature(const NurbsSurface& surface);
+
 struct ShellEnergy {
-  double membrane = 0, bending = 0;  // J
+  double membrane = 0, bending = 0;             // J
+  double least_strain = 0, largest_strain = 0;  // of E11, E22 and 0 at the quadrature points
   double total() const { return membrane + bending; }
 };
 

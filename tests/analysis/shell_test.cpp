@@ -38,41 +38,52 @@ class ShellLaws : public ::testing::TestWithParam<Case> {
   static Eigen::VectorXd deformed(const ShellModel& model, std::uint64_t seed = 7) {
     return model.rest() + 0.03 * Random(seed).vector(model.rest().size());
   }
+  // To less than half of its length, where the guard of the area holds.
+  static Eigen::VectorXd squeezed(const ShellModel& model) {
+    Eigen::VectorXd q = deformed(model);
+    for (Eigen::Index k = 0; k < q.size(); k += 3) q[k] *= 0.4;
+    return q;
+  }
 };
 
 TEST_P(ShellLaws, ForceIsMinusTheGradientOfTheEnergy) {
   const ShellModel m = model();
-  const Eigen::VectorXd q = deformed(m);
-  Eigen::VectorXd force(q.size()), ignored(q.size());
-  m.internal_force(q, force);
-  const double h = 1e-6;
-  for (int k = 0; k < q.size(); ++k) {
-    Eigen::VectorXd plus = q, minus = q;
-    plus[k] += h;
-    minus[k] -= h;
-    const double slope = (m.internal_force(plus, ignored).total() - m.internal_force(minus, ignored).total()) / (2 * h);
-    ASSERT_TRUE(test::near_rel(force[k], -slope, 1e-6, 1e-7 * force.cwiseAbs().maxCoeff())) << "dof " << k;
+  for (const Eigen::VectorXd& q : {deformed(m), squeezed(m)}) {
+    Eigen::VectorXd force(q.size()), ignored(q.size());
+    m.internal_force(q, force);
+    const double h = 1e-6;
+    for (int k = 0; k < q.size(); ++k) {
+      Eigen::VectorXd plus = q, minus = q;
+      plus[k] += h;
+      minus[k] -= h;
+      const double slope =
+          (m.internal_force(plus, ignored).total() - m.internal_force(minus, ignored).total()) / (2 * h);
+      ASSERT_TRUE(test::near_rel(force[k], -slope, 1e-6, 1e-7 * force.cwiseAbs().maxCoeff())) << "dof " << k;
+    }
   }
 }
 
 TEST_P(ShellLaws, ExactTangentIsMinusTheDerivativeOfTheForce) {
   const ShellModel m = model();
-  const Eigen::VectorXd q = deformed(m), dq = Random(3).vector(q.size());
-  Eigen::VectorXd df(q.size()), plus(q.size()), minus(q.size());
-  m.apply_tangent(q, dq, df, TangentKind::exact);
-  const double h = 1e-6;
-  m.internal_force(q + h * dq, plus);
-  m.internal_force(q - h * dq, minus);
-  const Eigen::VectorXd expected = (minus - plus) / (2 * h);
-  EXPECT_LT((df - expected).norm(), 1e-6 * expected.norm());
+  for (const Eigen::VectorXd& q : {deformed(m), squeezed(m)}) {
+    const Eigen::VectorXd dq = Random(3).vector(q.size());
+    Eigen::VectorXd df(q.size()), plus(q.size()), minus(q.size());
+    m.apply_tangent(q, dq, df, TangentKind::exact);
+    const double h = 1e-6;
+    m.internal_force(q + h * dq, plus);
+    m.internal_force(q - h * dq, minus);
+    const Eigen::VectorXd expected = (minus - plus) / (2 * h);
+    EXPECT_LT((df - expected).norm(), 1e-6 * expected.norm());
+  }
 }
 
 TEST_P(ShellLaws, UpperTangentIsSymmetricAndNeverBelowTheExactOne) {
   const ShellModel m = model();
-  const Eigen::VectorXd q = 0.97 * deformed(m);
-  Eigen::VectorXd exact(q.size()), upper(q.size()), other(q.size());
+  const Eigen::VectorXd shrunk = 0.97 * deformed(m), small = squeezed(m);
+  Eigen::VectorXd exact(shrunk.size()), upper(shrunk.size()), other(shrunk.size());
   Random random(11);
   for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::VectorXd& q = trial % 2 == 0 ? shrunk : small;
     const Eigen::VectorXd a = random.vector(q.size()), b = random.vector(q.size());
     m.apply_tangent(q, a, exact, TangentKind::exact);
     m.apply_tangent(q, a, upper);
@@ -290,6 +301,30 @@ TEST(ShellModel, PartsWithoutStiffnessAreAbsentAndTheOthersUnchanged) {
   expect_near_rel(eb.bending, e.bending, 1e-14);
   EXPECT_LT((f - fm - fb).norm(), 1e-13 * f.norm());
   EXPECT_LT(only_membrane.table_bytes(), model.table_bytes());
+}
+
+// Law (8) alone lets cloth go to nothing: pressed together, it resists less and less. The guard stands in the way, and
+// nowhere else.
+TEST(ShellModel, ClothResistsMoreTheFurtherItIsSqueezed) {
+  const ShellModel m({test::make_flat_panel(1, 1, 2, 3, 3, stiff_fabric())});
+  Eigen::VectorXd force(m.rest().size());
+  const auto energy_at = [&](double length) {
+    Eigen::VectorXd q = m.rest();
+    for (Eigen::Index k = 0; k < q.size(); k += 3) q[k] *= length;
+    return m.internal_force(q, force).total();
+  };
+  const auto by_law = [](double length) { return 0.5 * 11.7 * std::pow(0.5 * (length * length - 1), 2); };
+  expect_near_rel(energy_at(0.6), by_law(0.6), 1e-12);
+  expect_near_rel(energy_at(1.5), by_law(1.5), 1e-12);
+  double last = 0;
+  for (double length = 0.95; length > 0.02; length -= 0.01) {
+    const double pull = (energy_at(length - 1e-5) - energy_at(length + 1e-5)) / 2e-5;
+    EXPECT_GT(pull, last - 0.02) << "at " << length;
+    last = std::max(last, pull);
+  }
+  EXPECT_GT(energy_at(1e-6), 1e5);
+  expect_near_rel(m.internal_force(0.7 * m.rest(), force).least_strain, 0.5 * (0.49 - 1), 1e-12);
+  expect_near_rel(m.internal_force(1.5 * m.rest(), force).largest_strain, 0.5 * (2.25 - 1), 1e-12);
 }
 
 TEST(ShellModel, PanelsDontTouchEachOther) {
