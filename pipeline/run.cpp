@@ -24,9 +24,10 @@ constexpr double damped_scale = 0.8, smallest_damped = 0.25;
 constexpr double rest_share = 1e-4;            // of the largest panel, of the tolerance of rest
 constexpr double smallest_scale = 1.0 / 1024;  // ten halvings of the planned step
 // Of the energy turned over: in a step and in all. A step that the bound chooses is made smaller for less, down to a
-// share of it, unless the limit is hard, which leaves more in smaller ones.
+// share of it, unless the limit is hard, which leaves more in smaller ones, or the way is one to rest.
 constexpr double step_rise = 0.05, total_rise = 0.2;
 constexpr double small_rise = 0.005, smallest_careful = 1.0 / 16;
+constexpr int first_steps = 10;  // little is turned over yet, so that a part of it is nothing
 
 // Kinetic energy that nobody sees: of cloth that would cross its own distance from the origin in 1e8 s, or that moves
 // by the rounding of its places in a step. Without loads there is nothing else to compare a rise with.
@@ -325,7 +326,8 @@ class Loop {
     const double turned = std::max({result_.loop.scale, std::abs(e.load_work + report.load_work),
                                     std::abs(e.motion_work + report.motion_work), std::abs(e.drag_work), e.now()});
     const double smaller_step = report.dt < (1 - 1e-9) * result_.dt_last ? result_.loop.kick : 0;
-    const bool careful = bounded() && !hard_limit() && result_.loop.dt_scale > smallest_careful;
+    const bool careful =
+        bounded() && !hard_limit() && result_.loop.dt_scale > smallest_careful && result_.steps >= first_steps;
     const double rise = balance - (careful ? result_.loop.trough : result_.loop.balance);
     if (rise > (careful ? small_rise : step_rise) * turned + smaller_step + result_.loop.rounding) {
       return fmt::format("the energy rises by {:.3g} J without work that would explain it ({:.3g} J turned over)", rise,
@@ -340,8 +342,10 @@ class Loop {
     }
     result_.loop.scale = turned;
     result_.loop.kick = report.kick;
+    // What a smaller step seems to gain is no rise.
+    result_.loop.trough += std::clamp(balance - result_.loop.balance, 0.0, smaller_step);
+    result_.loop.trough = careful ? std::min(result_.loop.trough, balance) : balance;
     result_.loop.balance = balance;
-    result_.loop.trough = std::min(result_.loop.trough, balance);
     return {};
   }
 
