@@ -4,22 +4,26 @@
 #include <immintrin.h>
 #endif
 
+#include <chrono>
 #include <system_error>
 
 namespace toile {
 namespace {
 
-// Sleeping and waking costs half of this (0.1 ms), and a step's next piece of work is often nearer. Not more: where others want
-// the core too, one that spins is the first to wait, and all wait for it.
-constexpr int spins = 2000;
+// Waking takes up to half of this, and a step's next piece of work is often nearer. Not more: where others
+// want the core too, one that spins is the first to wait, and all wait for it.
+constexpr std::chrono::microseconds spin(500);
+constexpr int looks = 50;  // at the value from one look at the clock to the next
 
 template <class T>
 void wait_while(const std::atomic<T>& value, T old) {
-  for (int k = 0; k < spins; ++k) {
-    if (value.load(std::memory_order_acquire) != old) return;
+  for (const auto begin = std::chrono::steady_clock::now(); std::chrono::steady_clock::now() - begin < spin;) {
+    for (int k = 0; k < looks; ++k) {
+      if (value.load(std::memory_order_acquire) != old) return;
 #if defined(__x86_64__)
-    _mm_pause();
+      _mm_pause();
 #endif
+    }
   }
   value.wait(old, std::memory_order_acquire);
 }

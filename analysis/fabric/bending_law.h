@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "analysis/fabric/fabric.h"
-#include "analysis/shell/lanes.h"
+#include "analysis/lanes.h"
 
 namespace toile {
 

@@ -154,13 +154,16 @@ class Envelope {
     Pack s0{}, s1{}, s2{}, s3{};
     int k = 0;
     for (; k + 4 <= count; k += 4) {
-      s0.v += x[k].v * coefficient(k);
-      s1.v += x[k + 1].v * coefficient(k + 1);
-      s2.v += x[k + 2].v * coefficient(k + 2);
-      s3.v += x[k + 3].v * coefficient(k + 3);
+      s0.add_product(x[k], coefficient(k));
+      s1.add_product(x[k + 1], coefficient(k + 1));
+      s2.add_product(x[k + 2], coefficient(k + 2));
+      s3.add_product(x[k + 3], coefficient(k + 3));
     }
-    for (; k < count; ++k) s0.v += x[k].v * coefficient(k);
-    return {(s0.v + s1.v) + (s2.v + s3.v)};
+    for (; k < count; ++k) s0.add_product(x[k], coefficient(k));
+    s0 += s1;
+    s2 += s3;
+    s0 += s2;
+    return s0;
   }
 
   bool factorise_rows(int begin, int count) {
@@ -170,26 +173,27 @@ class Envelope {
     Pack* const x = rows_.data();  // columns from `first` on
     for (int l = 0; l < count; ++l) {
       const double* row = &factor_[start_[begin + l]];
-      for (int j = first_[begin + l]; j <= begin + l; ++j) x[j - first].v[l] = *row++;
+      for (int j = first_[begin + l]; j <= begin + l; ++j) x[j - first].set(l, *row++);
     }
     for (int j = first; j < begin; ++j) {
       const int from = std::max(first, first_[j]);
       const double* other = &factor_[start_[j]] + (from - first_[j]);
       const Pack sum = combination(x + (from - first), j - from, [&](int k) { return other[k]; });
-      x[j - first].v = (x[j - first].v - sum.v) * inverse_[j];
+      x[j - first] -= sum;
+      x[j - first] *= inverse_[j];
     }
     for (int l = 0; l < count; ++l) {
       const int j = begin + l;
-      const Pack sum = combination(x, j - first, [&](int k) { return x[k].v[l]; });
-      x[j - first].v -= sum.v;
-      const double pivot = x[j - first].v[l];
+      const Pack sum = combination(x, j - first, [&](int k) { return x[k][l]; });
+      x[j - first] -= sum;
+      const double pivot = x[j - first][l];
       if (!(pivot > 0)) return false;
       inverse_[j] = 1 / std::sqrt(pivot);
-      x[j - first].v *= inverse_[j];  // lanes of rows above l hold nothing that is read
+      x[j - first] *= inverse_[j];  // lanes of rows above l hold nothing that is read
     }
     for (int l = 0; l < count; ++l) {
       double* row = &factor_[start_[begin + l]];
-      for (int j = first_[begin + l]; j <= begin + l; ++j) *row++ = x[j - first].v[l];
+      for (int j = first_[begin + l]; j <= begin + l; ++j) *row++ = x[j - first][l];
     }
     return true;
   }

@@ -1,7 +1,10 @@
-// Eight numbers that one instruction takes together, where the machine has such.
+// Eight numbers in as many of the machine's registers as hold them. (A vector of eight that no register holds goes
+// through memory at each operation.)
 #pragma once
 
 #include <cstring>
+
+#include "analysis/lanes.h"
 
 namespace toile {
 
@@ -9,7 +12,31 @@ constexpr int pack_lanes = 8;
 
 // Within a struct, as calls pass bare vectors in ways that depend on the machine.
 struct Pack {
-  double __attribute__((vector_size(pack_lanes * sizeof(double)))) v;
+  static constexpr int parts = pack_lanes / lane_count;
+  Lanes part[parts];
+
+  double operator[](int l) const { return part[l / lane_count][l % lane_count]; }
+  void set(int l, double value) { part[l / lane_count][l % lane_count] = value; }
+
+  Pack& operator+=(const Pack& other) {
+    for (int k = 0; k < parts; ++k) part[k] += other.part[k];
+    return *this;
+  }
+  Pack& operator-=(const Pack& other) {
+    for (int k = 0; k < parts; ++k) part[k] -= other.part[k];
+    return *this;
+  }
+  Pack& operator*=(double s) {
+    for (int k = 0; k < parts; ++k) part[k] *= s;
+    return *this;
+  }
+  // this += a b.
+  void add_product(const Pack& a, double b) {
+    for (int k = 0; k < parts; ++k) part[k] += a.part[k] * b;
+  }
+  void add_product(const Pack& a, const Pack& b) {
+    for (int k = 0; k < parts; ++k) part[k] += a.part[k] * b.part[k];
+  }
 };
 
 inline Pack load_pack(const double* p) {
@@ -20,7 +47,7 @@ inline Pack load_pack(const double* p) {
 
 // In a fixed order.
 inline double sum(const Pack& p) {
-  return ((p.v[0] + p.v[1]) + (p.v[2] + p.v[3])) + ((p.v[4] + p.v[5]) + (p.v[6] + p.v[7]));
+  return ((p[0] + p[1]) + (p[2] + p[3])) + ((p[4] + p[5]) + (p[6] + p[7]));
 }
 
 }  // namespace toile

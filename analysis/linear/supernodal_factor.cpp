@@ -12,8 +12,8 @@ namespace {
 
 constexpr int group_count = 4;
 constexpr int together = 4;      // columns of a supernode in a solve, so that its rows are read a quarter as often
-constexpr int block = 48;        // columns of an update that one thread works out
-constexpr int wide = 4 * block;  // updates from here on are dealt out
+constexpr int block = 32;        // columns of an update that one thread works out
+constexpr int wide = 2 * block;  // updates from here on are dealt out
 
 using Dense = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
@@ -258,8 +258,8 @@ void SupernodalFactor::backward(const Node& node, double* scratch) const {
       int i = end;
       for (; i + pack_lanes <= rows; i += pack_lanes) {
         const Pack x = load_pack(scratch + i);
-        s0.v += load_pack(l0 + i).v * x.v, s1.v += load_pack(l1 + i).v * x.v;
-        s2.v += load_pack(l2 + i).v * x.v, s3.v += load_pack(l3 + i).v * x.v;
+        s0.add_product(x, load_pack(l0 + i)), s1.add_product(x, load_pack(l1 + i));
+        s2.add_product(x, load_pack(l2 + i)), s3.add_product(x, load_pack(l3 + i));
       }
       double t0 = sum(s0), t1 = sum(s1), t2 = sum(s2), t3 = sum(s3);
       for (; i < rows; ++i) {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "analysis/shell/kink_kernel.h"
-#include "analysis/shell/lanes.h"
+#include "analysis/lanes.h"
 #include "analysis/shell/material_basis.h"
 #include "analysis/shell/point_kernel.h"
 #include "analysis/workers.h"

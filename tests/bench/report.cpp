@@ -177,7 +177,7 @@ void growth(const std::string& samples) {
 
 void threads(const std::string& samples) {
   constexpr double least_gain = 1.6;
-  constexpr int pairs = 3;  // one after the other, as a shared machine has fast and slow minutes
+  constexpr int pairs = 7;  // one after the other, as a shared machine has fast and slow minutes
   for (const int n : {50, 100, 316}) {
     std::vector<double> motion, projection, solution, factorisation, outside;
     int control_points = 0;
