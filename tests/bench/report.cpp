@@ -131,7 +131,7 @@ void limits(const Medians& median) {
 void kidnapped(const std::string& samples) {
   constexpr double frame_target = 2e-3, place_target = 5e-3;
   const auto costs = kidnapped_by_step(samples, {8, 12, 16, 24, 32, 48, 64, 128, 256, 1024});
-  const std::string how = "1 core; 10 x 10, p = 2, 3 x 3 Gauss points a cell; without building, bound, writing";
+  const std::string how = "1 core; 10 x 10, p = 2, 2 x 2 Gauss points a cell; without building, bound, writing";
   const DrapeCost* chosen = nullptr;
   for (const DrapeCost& cost : costs) {
     note(
