@@ -168,11 +168,11 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                               {"bytes", sizeof(double) * system.projection->factor_nonzeros()}};
   }
   counters["steps"] = {{"count", run.steps + run.redone_steps}};
-  if (!scene.dt) counters["time_step"] = {{"seconds", run.bound_seconds}};
+  counters["time_step"] = {{"seconds", run.bound_seconds}};
   if (!scene.formats.empty()) counters["frames"] = {{"seconds", run.frame_seconds}};
   if (run.allocations.known) {
     counters["steps"]["allocations"] = run.allocations.steps;
-    if (!scene.dt) counters["time_step"]["allocations"] = run.allocations.bound;
+    counters["time_step"]["allocations"] = run.allocations.bound;
     if (!scene.formats.empty()) counters["frames"]["allocations"] = run.allocations.frames;
   }
   report["counters"] = counters;

@@ -178,14 +178,17 @@ class Loop {
     loop.bound_every = bound_every;
     loop.strain_at_bound = loop.strain;
     if (!bounded()) return;
-    const Clock::time_point start = Clock::now();
-    const long asked = allocations();
-    const System& system = *result_.system;
-    result_.bound = bound_of(system);
+    result_.bound = ask_for_bound();
     if (in_turn && std::abs(result_.bound.dt / before - 1) <= bound_holds)
       loop.bound_every = std::min(2 * kept, bound_rarely);
+  }
+  TimeStepBound ask_for_bound() {
+    const Clock::time_point start = Clock::now();
+    const long asked = allocations();
+    const TimeStepBound bound = bound_of(*result_.system);
     result_.bound_seconds += since(start);
     result_.allocations.bound += allocations() - asked;
+    return bound;
   }
 
   bool hard_limit() const {
@@ -199,7 +202,7 @@ class Loop {
     return scene_.dt && bounded() ? std::min(planned, step_safety * result_.bound.dt) : planned;
   }
   void hold_to_bound() {
-    const TimeStepBound bound = bound_of(*result_.system);
+    const TimeStepBound bound = ask_for_bound();
     if (!(*scene_.dt > bound.dt)) return;
     result_.bound = bound;
     result_.warnings.push_back(fmt::format(

@@ -8,9 +8,8 @@
 //   E11, E22, g12 Green-Lagrange strain, g12 = 2 E12 = x1.x2                          [eq. 3]
 //   kappa_ab      a3 . x_ab                                                           [eq. 4]
 //   S, m          stress resultants S = k E and moments                               [eqs. 8, 9]
-//   guard         energy of cloth squeezed below `crush` of its area, where it bends: b (1 - s)^2 / (2 s), s = j /
-//   crush.
-//                 Law (8) resists less and less from a length of 1/sqrt(3) on, and without area there is no normal.
+//   guard         energy of bending cloth below s = j / crush = 1: b (1 - s)^2 / (2 s). Law (8) resists less and less
+//                 once cloth is shorter than 1/sqrt(3) of itself, and without area there is no normal.
 //
 // The gradients below are eqs. (13) and (15) summed over their moments first: with M = sum m_ab x_ab and
 // t = (M - (M.a3) a3) / j, the variation of sum m_ab kappa_ab is sum m_ab a3 . dx_ab + (x2 x t) . dx1 + (t x x1) . dx2.

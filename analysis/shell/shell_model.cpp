@@ -5,8 +5,8 @@
 #include <tuple>
 #include <utility>
 
-#include "analysis/shell/kink_kernel.h"
 #include "analysis/lanes.h"
+#include "analysis/shell/kink_kernel.h"
 #include "analysis/shell/material_basis.h"
 #include "analysis/shell/point_kernel.h"
 #include "analysis/workers.h"

@@ -62,7 +62,7 @@ struct ShellState {
   Eigen::Vector3d position;
   Eigen::Vector3d strain;     // E11, E22, 2 E12
   Eigen::Vector3d curvature;  // kappa11, kappa22, kappa12, change from rest
-  Eigen::Vector3d second_pk;  // S11, S22, S12 [N/m]
+  Eigen::Vector3d second_pk;  // S11, S22, S12 [N/m], of law (8)
   Eigen::Vector2d nominal;    // lambda S in weft and warp [N/m]
 };
 
