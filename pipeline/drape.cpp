@@ -97,18 +97,21 @@ bool holds(const std::filesystem::path& directory, const std::filesystem::path& 
   return std::filesystem::equivalent(directory, std::filesystem::absolute(file).parent_path(), error);
 }
 
-// The limit is held at its points; where the cloth between them is stretched much farther, they lie too far apart.
-std::string stretched_between_points(const StrainLimit& limit, const StateMeasures& measures) {
-  constexpr double much = 3;
+// The limit is held at its points; where the cloth between them is strained much farther, they lie too far apart.
+std::string strained_between_points(const StrainLimit& limit, const StateMeasures& measures) {
+  constexpr double much = 3, fold = 10;  // a fold within a span looks squeezed, and is no worse than the span
   if (!limit.on) return {};
   for (int d : {0, 1}) {
-    const double allowed = (d == 0 ? limit.weft : limit.warp).stretch, seen = measures.strain.p999[d];
-    if (seen > much * allowed)
+    const StrainBand& band = d == 0 ? limit.weft : limit.warp;
+    const auto told = [&](double allowed, const char* how, double seen) {
       return fmt::format(
-          "between the points that hold the limit of {:.2g}, the {} is strained by {:.2g} and more on a thousandth of "
-          "the "
+          "between the points that hold the limit of {:.2g}, the {} is {} by {:.2g} and more on a thousandth of the "
           "cloth: a smaller span holds it in more places",
-          allowed, d == 0 ? "weft" : "warp", seen);
+          allowed, d == 0 ? "weft" : "warp", how, seen);
+    };
+    const double stretch = measures.strain.p999[d], squeeze = -measures.strain.p001[d];
+    if (stretch > much * band.stretch) return told(band.stretch, "strained", stretch);
+    if (squeeze > fold * band.compress) return told(band.compress, "squeezed", squeeze);
   }
   return {};
 }
@@ -208,7 +211,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   // The forces of a refused step are not those of the state that it started from.
   const double forces_of = result.exit == RunExit::solver_failed ? 0 : result.dt_last;
   const StateMeasures measures = measure(built, *result.system, result.state, forces_of);
-  if (const std::string between = stretched_between_points(built.scene.strain_limit, measures); !between.empty()) {
+  if (const std::string between = strained_between_points(built.scene.strain_limit, measures); !between.empty()) {
     result.warnings.push_back(between);
     console.warning(between);
   }

@@ -38,6 +38,7 @@ void extremes(const std::vector<double>& x, const std::vector<double>& weights, 
   e.mean_abs[c] /= total;
   e.min[c] = *std::ranges::min_element(x);
   e.max[c] = *std::ranges::max_element(x);
+  e.p001[c] = percentile(x, weights, 0.001);
   e.p999[c] = percentile(x, weights, 0.999);
 }
 

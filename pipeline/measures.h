@@ -19,7 +19,8 @@ std::vector<GridSample> grid_samples(const Build& build, int per_direction = 50)
 
 // Weft and warp of a strain or stress over the grid.
 struct Extremes {
-  Eigen::Vector2d min{0, 0}, max{0, 0}, mean{0, 0}, mean_abs{0, 0}, p999{0, 0};  // p999: 99.9 % of the area lies below
+  Eigen::Vector2d min{0, 0}, max{0, 0}, mean{0, 0}, mean_abs{0, 0};
+  Eigen::Vector2d p001{0, 0}, p999{0, 0};  // 0.1 and 99.9 % of the area lie below
 };
 
 struct StateMeasures {

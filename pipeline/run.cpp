@@ -176,8 +176,10 @@ class Loop {
     const int kept = loop.bound_every;
     loop.steps_since_bound = 0;
     loop.bound_every = bound_every;
+    const bool held = bounded();
+    if (!held && !stiffer(loop.strain, loop.strain_at_bound)) return;
     loop.strain_at_bound = loop.strain;
-    if (!bounded()) return;
+    if (!held) return hold_to_bound();
     result_.bound = ask_for_bound();
     if (in_turn && std::abs(result_.bound.dt / before - 1) <= bound_holds)
       loop.bound_every = std::min(2 * kept, bound_rarely);
@@ -296,14 +298,13 @@ class Loop {
   // Less than what ends a run, but more than a stable one gains.
   void check_energy() {
     const EnergyBalance& e = result_.energy;
-    const double turned = std::max({std::abs(e.load_work), std::abs(e.motion_work), e.start});
+    const double turned = result_.loop.scale;
     if (!(e.injected > scene_.energy_gain * turned) || !(e.injected > result_.loop.rounding)) return;
     result_.exit = RunExit::check_failed;
     result_.reason = fmt::format(
         "the energy rose by {:.2g} % of what was turned over without work that would explain it, allowed are {:.2g} % "
-        "(solver.energy_gain){}: a smaller dt or a lower strain_limit.stiffness is more accurate",
-        100 * e.injected / turned, 100 * scene_.energy_gain,
-        scene_.strain_limit.on ? "" : "; cloth that is squeezed to nothing gains too, which a strain limit prevents");
+        "(solver.energy_gain): a smaller dt or a lower strain_limit.stiffness is more accurate",
+        100 * e.injected / turned, 100 * scene_.energy_gain);
   }
 
   // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest /
