@@ -24,7 +24,7 @@ constexpr double damped_scale = 0.8, smallest_damped = 0.25;
 constexpr double rest_share = 1e-4;            // of the largest panel, of the tolerance of rest
 constexpr double smallest_scale = 1.0 / 1024;  // ten halvings of the planned step
 // Of the energy turned over: in a step and in all. A step that the bound chooses is made smaller for less, down to a
-// share of it, unless the limit is hard, which leaves more in smaller ones, or the way is one to rest.
+// share of it, unless the limit is hard, which leaves more in smaller ones.
 constexpr double step_rise = 0.05, total_rise = 0.2;
 constexpr double small_rise = 0.005, smallest_careful = 1.0 / 16;
 constexpr int first_steps = 10;  // little is turned over yet, so that a part of it is nothing

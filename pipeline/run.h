@@ -116,15 +116,16 @@ double rest_tolerance(const Build& build);
 
 // Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
 // state, evaluated anew every 100 steps, and less often, up to every 400, where it hardly changes, at once where cloth
-// is stretched or squeezed so far that it is stiffer by a tenth; where the projection had to damp, less. A `dt` of the
+// is stretched or squeezed so far that it is stiffer by a fifth; where the projection had to damp, less. A `dt` of the
 // scene that is more than the bound at the start, or proves too large, is held to the bound likewise.
 //   (1) every number of an accepted step is finite;
 //   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from
-//   step
-//       to step by no more than 5 % of the energy turned over so far, and in all by no more than 20 %, far less than an
-//       unstable step soon does.
-//       A step that breaks this is redone with half the step; the planned step is halved ten times at most, then the
-//       run ends as solver_failed at the last accepted state.
+//       step to step by no more than 5 % of the energy turned over so far, and in all by no more than 20 %. Steps that
+//       follow the bound are refused for half a percent since one was last refused, down to a sixteenth of the bound.
+//       A step that breaks this is redone with half the step, ten times at most, then the run ends as solver_failed at
+//       the last accepted state. Steps grow again after 100 quiet ones, after twice as many each time.
+//   (3) a finished run whose energy rose by more than Scene::energy_gain of the most that was turned over is
+//       check_failed.
 // Until rest: without drag, halted at each peak of the kinetic energy; time is that of no real motion. Once all motions
 // and releases of pins are over, the run ends where `Relaxation::remaining` is within rest_tolerance(), with a frame of
 // its own, or as check_failed after max_steps.

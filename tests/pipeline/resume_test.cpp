@@ -128,7 +128,7 @@ TEST(Resume, TheLagrangeNewtonEndsWithTheSameBytes) {
   }
 }
 
-// Without a limit, with steps far above the bound.
+// Cloth that stiffens as it is stretched manifold, so that steps are refused.
 TEST(Resume, AHalvedStepIsTakenUpAsItWas) {
   const Folder folder("resume_halved");
   const Build b = built(folder, test::scene_text("[[pin]]\nat = \"corner:0,0\"\n[[pin]]\nat = \"corner:1,0\"\n"),
