@@ -13,7 +13,7 @@
 #include "io/file.h"
 #include "pipeline/build.h"
 #include "pipeline/checkpoint.h"
-#include "pipeline/cli.h"
+#include "pipeline/exit_code.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/json_text.h"
 #include "pipeline/output.h"

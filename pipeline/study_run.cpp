@@ -10,7 +10,7 @@
 
 #include "geometry/error.h"
 #include "io/file.h"
-#include "pipeline/cli.h"
+#include "pipeline/exit_code.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/json_text.h"
 #include "pipeline/scene.h"

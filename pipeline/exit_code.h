@@ -1,4 +1,4 @@
-// The `toile` program: options in, exit code out. (README, "Exit codes")
+// What the program ends with. (README, "Exit codes")
 #pragma once
 
 namespace toile {
@@ -15,7 +15,5 @@ enum ExitCode : int {
   exit_output = 8,
   exit_interrupted = 130,
 };
-
-int run_program(int argc, char** argv);
 
 }  // namespace toile

@@ -1,0 +1,8 @@
+// The `toile` program: options in, exit code out.
+#pragma once
+
+namespace toile {
+
+int run_program(int argc, char** argv);
+
+}  // namespace toile
