@@ -37,8 +37,4 @@ std::vector<TrimmedSurface> make_faces(const FileSurface& surface, std::vector<B
 // The frame coordinates that the boundaries' curves reach: what a plane or a cylinder without ends has to cover.
 Eigen::AlignedBox3d reach(const Frame& frame, const std::vector<BoundaryCurves>& boundaries);
 
-// The surface over a window of a closed direction that may reach over its seam, up to two periods wide, beginning at or
-// after the domain's begin. Bitwise the old net but for what the cuts add.
-NurbsSurface unrolled(const NurbsSurface& surface, Direction direction, Interval window);
-
 }  // namespace toile::iges
