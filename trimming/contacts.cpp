@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "trimming/bezier_piece.h"
 #include "trimming/crossings.h"
 
 namespace toile {
@@ -17,68 +18,14 @@ using Eigen::Vector2d;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-struct Box {
-  Vector2d min, max;
-};
-
 // A part of a span in the direction of its loop.
-struct Piece {
+struct Piece : BezierPiece {
   int loop = 0, link = 0;  // link: number of the span in the chain of its loop
-  double s0 = 0, s1 = 1;   // on that span, in the loop's direction
-  TrimSpan span;           // control points in the loop's direction
-  Box box;
-
-  int degree() const { return span.degree; }
-  Vector2d first() const { return span.first(); }
-  Vector2d last() const { return span.last(); }
-  double size() const { return (box.max - box.min).maxCoeff(); }
-  bool straight() const { return span.degree == 1; }
 };
-
-void set_box(Piece& piece) {
-  piece.box = {piece.first(), piece.first()};
-  for (int i = 1; i <= piece.degree(); ++i) {
-    piece.box.min = piece.box.min.cwiseMin(piece.span.point(i));
-    piece.box.max = piece.box.max.cwiseMax(piece.span.point(i));
-  }
-}
 
 std::pair<Piece, Piece> halves(const Piece& piece) {
-  Piece left = piece, right = piece;
-  const std::size_t n = static_cast<std::size_t>(piece.degree());
-  std::array<Eigen::Vector3d, max_degree + 1> d;
-  for (std::size_t i = 0; i <= n; ++i) {
-    const double w = piece.span.w[i];
-    d[i] = {piece.span.u[i] * w, piece.span.v[i] * w, w};
-  }
-  const auto store = [](TrimSpan& span, std::size_t i, const Eigen::Vector3d& h) {
-    span.u[i] = h.x() / h.z();
-    span.v[i] = h.y() / h.z();
-    span.w[i] = h.z();
-  };
-  for (std::size_t k = 1; k <= n; ++k) {
-    for (std::size_t i = 0; i + k <= n; ++i) d[i] = 0.5 * (d[i] + d[i + 1]);
-    store(left.span, k, d[0]);
-    if (k < n) store(right.span, n - k, d[n - k]);
-  }
-  right.span.u[0] = left.span.u[n];
-  right.span.v[0] = left.span.v[n];
-  right.span.w[0] = left.span.w[n];
-  left.s1 = right.s0 = 0.5 * (piece.s0 + piece.s1);
-  set_box(left);
-  set_box(right);
-  return {left, right};
-}
-
-// No leg of the control polygon goes back along the chord: every line across it meets the piece at most once, so the
-// piece can't meet itself.
-bool forward(const Piece& piece) {
-  const Vector2d chord = piece.last() - piece.first();
-  if (chord == Vector2d::Zero()) return false;
-  for (int i = 0; i < piece.degree(); ++i) {
-    if (!((piece.span.point(i + 1) - piece.span.point(i)).dot(chord) >= 0)) return false;
-  }
-  return true;
+  const auto [left, right] = split(piece, 0.5);
+  return {{left, piece.loop, piece.link}, {right, piece.loop, piece.link}};
 }
 
 double cross(const Vector2d& a, const Vector2d& b) {
@@ -142,11 +89,7 @@ class Finder {
       for (std::size_t k = 0; k < of.size(); ++k) {
         TrimSpan span = of[loop.curves[c].reversed ? of.size() - 1 - k : k];
         if (span.degenerate()) continue;
-        if (loop.curves[c].reversed) {
-          std::reverse(span.u.begin(), span.u.begin() + span.degree + 1);
-          std::reverse(span.v.begin(), span.v.begin() + span.degree + 1);
-          std::reverse(span.w.begin(), span.w.begin() + span.degree + 1);
-        }
+        if (loop.curves[c].reversed) turn(span);
         for (std::size_t i = 0; i <= static_cast<std::size_t>(span.degree); ++i) {
           span.u[i] *= scale_.x();
           span.v[i] *= scale_.y();
@@ -156,12 +99,9 @@ class Finder {
     }
     std::vector<Piece> list;
     for (std::size_t k = 0; k < chain.size(); ++k) {
-      Piece piece;
-      piece.loop = l;
-      piece.link = static_cast<int>(k);
-      piece.span = chain[k];
-      set_box(piece);
-      split_forward(piece, 0, list);
+      split_forward(BezierPiece(chain[k]), [&](const BezierPiece& piece) {
+        list.push_back({piece, l, static_cast<int>(k)});
+      });
     }
     while (!list.empty() && list.size() < 3) {
       std::vector<Piece> finer;
@@ -179,40 +119,9 @@ class Finder {
     }
   }
 
-  void split_forward(const Piece& piece, int depth, std::vector<Piece>& out) {
-    if (depth == 30 || forward(piece)) {
-      out.push_back(piece);
-      return;
-    }
-    const auto [a, b] = halves(piece);
-    split_forward(a, depth + 1, out);
-    split_forward(b, depth + 1, out);
-  }
-
   bool boxes_apart(const Box& a, const Box& b) const {
     return a.max.x() + margin_ < b.min.x() || b.max.x() + margin_ < a.min.x() || a.max.y() + margin_ < b.min.y() ||
            b.max.y() + margin_ < a.min.y();
-  }
-
-  // The hulls lie apart along the normal of a's chord.
-  bool chord_parts(const Piece& a, const Piece& b) const {
-    const Vector2d chord = a.last() - a.first();
-    const double length = chord.norm();
-    if (length == 0) return false;
-    const Vector2d normal = Vector2d(-chord.y(), chord.x()) / length;
-    double a_min = 0, a_max = 0;
-    double b_min = std::numeric_limits<double>::infinity(), b_max = -b_min;
-    for (int i = 1; i <= a.degree(); ++i) {
-      const double x = normal.dot(a.span.point(i) - a.first());
-      a_min = std::min(a_min, x);
-      a_max = std::max(a_max, x);
-    }
-    for (int i = 0; i <= b.degree(); ++i) {
-      const double x = normal.dot(b.span.point(i) - a.first());
-      b_min = std::min(b_min, x);
-      b_max = std::max(b_max, x);
-    }
-    return a_max + margin_ < b_min || b_max + margin_ < a_min;
   }
 
   bool near_known_contact(const Piece& a, const Piece& b) const {
@@ -230,7 +139,7 @@ class Finder {
       segments(a, b);
       return;
     }
-    if (chord_parts(a, b) || chord_parts(b, a) || near_known_contact(a, b)) return;
+    if (chord_parts(a, b, margin_) || chord_parts(b, a, margin_) || near_known_contact(a, b)) return;
     if (a.size() <= smallest_ && b.size() <= smallest_) {
       add_contact(a, b, 0.5 * (a.first() + b.first()));
       return;

@@ -31,12 +31,9 @@ bool contains(const TrimmedSurface& surface, const TrimTopology& topology, const
   PredicateCounts counts;
   int total = 0;
   for (std::size_t l = 0; l < surface.loops.size(); ++l) {
-    for (std::size_t c = 0; c < surface.loops[l].curves.size(); ++c) {
-      const auto spans = topology.spans.of(static_cast<int>(l), static_cast<int>(c));
-      const std::optional<int> winding = winding_number(spans, uv, counts);
-      if (!winding) return true;
-      total += surface.loops[l].curves[c].reversed ? -*winding : *winding;
-    }
+    const std::optional<int> winding = winding_number(surface.loops, topology.spans, static_cast<int>(l), uv, counts);
+    if (!winding) return true;
+    total += *winding;
   }
   return total == 1;
 }

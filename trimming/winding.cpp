@@ -49,4 +49,16 @@ std::optional<int> winding_number(std::span<const TrimSpan> spans, const Eigen::
   return total;
 }
 
+std::optional<int> winding_number(const std::vector<TrimLoop>& loops, const TrimSpans& spans, int loop,
+                                  const Eigen::Vector2d& point, PredicateCounts& counts) {
+  const std::vector<TrimCurve>& curves = loops[static_cast<std::size_t>(loop)].curves;
+  int total = 0;
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    const auto n = winding_number(spans.of(loop, static_cast<int>(c)), point, counts);
+    if (!n) return std::nullopt;
+    total += curves[c].reversed ? -*n : *n;
+  }
+  return total;
+}
+
 }  // namespace toile

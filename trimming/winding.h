@@ -13,4 +13,8 @@ namespace toile {
 std::optional<int> winding_number(std::span<const TrimSpan> spans, const Eigen::Vector2d& point,
                                   PredicateCounts& counts);
 
+// Of one loop, given by its position, in its direction.
+std::optional<int> winding_number(const std::vector<TrimLoop>& loops, const TrimSpans& spans, int loop,
+                                  const Eigen::Vector2d& point, PredicateCounts& counts);
+
 }  // namespace toile
