@@ -2,8 +2,9 @@
 #   make demo     build, drape a real panel file, say where the results are
 #   make test     build with warnings as errors, run all tests
 #   make bench    benchmarks: speed as ratios and as cost against size
-#   make verify   read what we write with OpenCASCADE and compare; trace hard trims against exact arithmetic; count what
-#                 unused features cost
+#   make verify   read what we write with OpenCASCADE, FreeCAD, ParaView and Blender and compare; trace hard trims
+#                 against exact arithmetic; count what unused features cost; run what reads files under the address and
+#                 undefined-behaviour sanitizers
 #   make format   clang-format on all sources
 #   make install  to PREFIX (default /usr/local)
 PREFIX ?= /usr/local
@@ -21,9 +22,6 @@ build/%/build.ninja:
 
 demo: all
 	$(TOILE) drape samples/skirt_panel/scene.toml --overwrite
-	@echo
-	@echo "Open out/skirt_panel/draped.igs in FreeCAD, out/skirt_panel/frames/skirt_panel.pvd in ParaView,"
-	@echo "or look at out/skirt_panel/preview.png."
 
 test: build/native/build.ninja
 	cmake --build --preset native -j $(JOBS)
@@ -39,13 +37,18 @@ verify: build/verify/build.ninja
 	cmake --preset callgrind
 	cmake --build --preset callgrind -j $(JOBS) --target toile
 	tests/verify/instructions build/callgrind/pipeline/toile
+	cmake --preset asan
+	cmake --build --preset asan -j $(JOBS) --target test_geometry test_trimming test_io
+	ctest --preset asan -j $(JOBS) -L 'geometry|trimming|io'
 
 format:
 	.ci/install format
 	git ls-files '*.h' '*.cpp' | xargs clang-format -i
 
-install: all
-	cmake --install build/native --prefix $(PREFIX)
+# For any machine of its kind: without the instructions that only this one may have.
+install: build/release/build.ninja
+	cmake --build --preset release -j $(JOBS) --target toile
+	cmake --install build/release --prefix $(PREFIX)
 
 clean:
 	rm -rf build out

@@ -97,7 +97,7 @@ void AffineMap::expand(const Eigen::Ref<const Eigen::VectorXd>& x, double t, Eig
 void AffineMap::expand(const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Matrix3Xd& places,
                        Eigen::Ref<Eigen::VectorXd> q, Workers* workers) const {
   assert(x.size() == 3 * nodes() && q.size() == 3 * control_points());
-  share_out(workers, control_points(), [&](int, int begin, int end) {
+  share_out(workers, control_points(), [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       for (Matrix::InnerIterator e(free_, i); e; ++e) sum += e.value() * x.segment<3>(3 * e.col());
@@ -110,7 +110,7 @@ void AffineMap::expand(const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::
 void AffineMap::reduce(const Eigen::Ref<const Eigen::VectorXd>& f, Eigen::Ref<Eigen::VectorXd> fx,
                        Workers* workers) const {
   assert(f.size() == 3 * control_points() && fx.size() == 3 * nodes());
-  share_out(workers, nodes(), [&](int, int begin, int end) {
+  share_out(workers, nodes(), [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       for (Matrix::InnerIterator e(transposed_, k); e; ++e) sum += e.value() * f.segment<3>(3 * e.col());

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "analysis/nearest_cells.h"
 #include "geometry/basis.h"
 #include "geometry/error.h"
 
@@ -26,8 +27,8 @@ struct Line {
     const int p = k.degree();
     for (int i = 0; i < k.control_point_count(); ++i) {
       std::array<int, 2> range{cells(), 0};
-      for (int c = 0; c < cells(); ++c)
-        if (spans[c] >= i && spans[c] <= i + p) range = {std::min(range[0], c), c + 1};
+      const auto first = std::ranges::lower_bound(spans, i), last = std::ranges::upper_bound(spans, i + p);
+      if (first < last) range = {static_cast<int>(first - spans.begin()), static_cast<int>(last - spans.begin())};
       support.push_back(range);
       const double g = std::clamp(k.greville(i), breaks.front(), breaks.back());
       const auto above = std::upper_bound(breaks.begin() + 1, breaks.end() - 1, g);
@@ -86,7 +87,6 @@ class Extender {
     int control_point;  // the member of a seam that this host is near
   };
   Nearest nearest_host(int leader) const;
-  std::pair<Host, double> nearest_cell(int control_point) const;
   Row polynomial_row(int control_point, Host host) const;
   Row tangent_row(int control_point, Host host) const;
   Eigen::Vector3d follow(const Row& row) const;
@@ -105,6 +105,7 @@ class Extender {
   std::vector<double> support_;            // part of each leader's support in the material
   std::vector<Role> role_;                 // members have their leader's
   std::vector<char> host_;                 // cells all of whose functions stand on their own
+  std::vector<NearestCell> nearest_;       // of those, to each control point
   std::vector<Row> rows_;                  // of extended and bare leaders, over leaders
 };
 
@@ -141,32 +142,13 @@ void Extender::find_hosts() {
     }
 }
 
-// Nearest cell centre in units of cells, ring by ring; ties go to the cell that comes first.
-std::pair<Extender::Host, double> Extender::nearest_cell(int control_point) const {
-  const double cu = u_.centre[control_point % rest_.count_u()], cv = v_.centre[control_point / rest_.count_u()];
-  const int a0 = std::min(static_cast<int>(cu), u_.cells() - 1), b0 = std::min(static_cast<int>(cv), v_.cells() - 1);
-  Host best;
-  double best_squared = std::numeric_limits<double>::infinity();
-  for (int ring = 0; ring < std::max(u_.cells(), v_.cells()); ++ring) {
-    if (best.i >= 0 && (ring - 0.5) * (ring - 0.5) > best_squared) break;
-    for (int b = std::max(b0 - ring, 0); b <= std::min(b0 + ring, v_.cells() - 1); ++b) {
-      const int stride = std::abs(b - b0) == ring || ring == 0 ? 1 : 2 * ring;
-      for (int a = a0 - ring; a <= a0 + ring; a += stride) {
-        if (a < 0 || a >= u_.cells() || !host_[a + u_.cells() * b]) continue;
-        const double du = a + 0.5 - cu, dv = b + 0.5 - cv, squared = du * du + dv * dv;
-        if (squared < best_squared) best = {a, b}, best_squared = squared;
-      }
-    }
-  }
-  return {best, best_squared};
-}
-
 Extender::Nearest Extender::nearest_host(int leader) const {
   Nearest nearest{{}, leader};
   double best_squared = std::numeric_limits<double>::infinity();
   for (const int member : members_[leader]) {
-    const auto [host, squared] = nearest_cell(member);
-    if (squared < best_squared) nearest = {host, member}, best_squared = squared;
+    const NearestCell& cell = nearest_[member];
+    if (cell.distance_squared < best_squared)
+      nearest = {{cell.i, cell.j}, member}, best_squared = cell.distance_squared;
   }
   return nearest;
 }
@@ -278,6 +260,7 @@ Extension Extender::run() {
     find_hosts();
   }
 
+  nearest_ = nearest_cells(u_.cells(), v_.cells(), host_, u_.centre, v_.centre);
   rows_.resize(size());
   for (int k = 0; k < size(); ++k) {
     if (role_[k] == Role::own || leader_[k] != k) continue;

@@ -1,6 +1,6 @@
 // Extended B-splines: functions with too little cloth under them, and control points with none, follow their neighbours
 // by polynomial extension, so that small cut cells bound neither the time step nor the conditioning.
-// [Hoellig, Reif, Wipper 2001; positions are extended, design.md Decision 5]
+// [Hoellig, Reif, Wipper 2001; positions are extended, not displacements]
 #pragma once
 
 #include <string>

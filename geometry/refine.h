@@ -82,7 +82,7 @@ NurbsCurve<Dim> reversed(const NurbsCurve<Dim>& curve);
 template <int Dim>
 NurbsCurve<Dim> with_domain(const NurbsCurve<Dim>& curve, Interval domain);
 
-// Refinement to analysis resolution (design.md, "Refinement"), clamped.
+// Refinement to analysis resolution, clamped.
 //   (1) Degree per direction: the larger of the surface's and the asked one (at least 2 when one is asked). A flat
 //   affine
 //       panel takes exactly what is asked, and the larger of its own and 2 when nothing is.

@@ -19,6 +19,10 @@ std::string name(MarkKind kind) {
       return "line";
     case MarkKind::text:
       return "text";
+    case MarkKind::sew:
+      return "sew";
+    case MarkKind::slit:
+      return "slit";
   }
   return {};
 }

@@ -32,12 +32,20 @@ struct TrimLoop {
 };
 
 // What a pattern draws on a panel beside its outline, in the parameter plane: carried along, never cut.
-enum class MarkKind { grain, notch, drill, line, text };
+enum class MarkKind {
+  grain,
+  notch,
+  drill,
+  line,
+  text,
+  sew,   // where the panel is sewn; its outline is the line where it is cut
+  slit,  // a cut into the material that parts nothing: an edge drawn out and back
+};
 std::string name(MarkKind kind);  // "grain", ...
 struct PanelMark {
   MarkKind kind = MarkKind::line;
   Eigen::Vector2d at{0, 0};     // a point; where a curve starts
-  std::optional<Curve2> curve;  // grain (straight, along the warp), line, some notches
+  std::optional<Curve2> curve;  // grain (straight, along the warp), line, sew, slit, some notches
   std::string text;
 };
 

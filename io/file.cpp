@@ -137,4 +137,10 @@ void write_file(const std::filesystem::path& asked, std::string_view bytes, Flus
   if (closed != 0 || ::rename(temporary.c_str(), path.c_str()) != 0) throw fail();
 }
 
+void require_free(const std::filesystem::path& path, bool overwrite) {
+  std::error_code error;
+  if (overwrite || !std::filesystem::is_regular_file(path, error)) return;
+  throw OutputError(path.string() + " exists; give --overwrite to replace it");
+}
+
 }  // namespace toile

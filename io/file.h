@@ -19,4 +19,7 @@ enum class Flush { yes, no };
 // Throws OutputError.
 void write_file(const std::filesystem::path& path, std::string_view bytes, Flush flush = Flush::yes);
 
+// Throws OutputError ("...; give --overwrite to replace it") where a file stands at `path` and `overwrite` is false.
+void require_free(const std::filesystem::path& path, bool overwrite);
+
 }  // namespace toile

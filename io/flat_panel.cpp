@@ -33,6 +33,17 @@ TrimmedSurface flat_panel(std::vector<std::vector<TrimCurve>> loops, const Affin
   return face;
 }
 
+Curve2 polyline_curve(const std::vector<Eigen::Vector2d>& points) {
+  Curve2::Points p(2, static_cast<Eigen::Index>(points.size()));
+  std::vector<double> knots{0};
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    p.col(static_cast<Eigen::Index>(k)) = points[k];
+    knots.push_back(static_cast<double>(k));
+  }
+  knots.push_back(static_cast<double>(points.size()) - 1);
+  return Curve2(KnotVector(1, std::move(knots)), std::move(p));
+}
+
 double polygon_area(const std::vector<TrimCurve>& loop) {
   double twice = 0;
   for (const TrimCurve& trim : loop) {

@@ -20,4 +20,7 @@ TrimmedSurface flat_panel(std::vector<std::vector<TrimCurve>> loops, const Affin
 // is, exact for lines. Tells outlines apart by size; who is inside whom is decided exactly (trimming/loops.h).
 double polygon_area(const std::vector<TrimCurve>& loop);
 
+// The polyline through these points (two or more), one span a segment of length 1.
+Curve2 polyline_curve(const std::vector<Eigen::Vector2d>& points);
+
 }  // namespace toile

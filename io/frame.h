@@ -25,6 +25,7 @@ struct FrameFields {
 struct FramePanel {
   std::string name;
   const NurbsSurface* surface = nullptr;        // the deformed net [m]
+  const NurbsSurface* flat = nullptr;           // its pattern [m], which textures follow; null: `surface`
   const TrimmedSurface* face = nullptr;         // its loops; parameters agree with `surface`
   const TrimmedTriangles* triangles = nullptr;  // parameters agree with `surface`
   FrameFields fields;
@@ -40,6 +41,7 @@ struct Frame {
   int number = 0;   // 0, 1, 2, ...
   double time = 0;  // s
   std::span<const FramePanel> panels;
+  Eigen::Vector3d up{0, 0, 1};  // unit vector
 };
 
 // Frames arrive once, in order (std::logic_error otherwise). A failed write throws OutputError; files appear whole or

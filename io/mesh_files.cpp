@@ -6,8 +6,11 @@
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "geometry/error.h"
+#include "io/file.h"
+#include "io/mesh_vertices.h"
 
 namespace toile {
 
@@ -24,12 +27,6 @@ void append(std::string& to, T value) {
 
 void append_floats(std::string& to, const Eigen::Vector3d& x) {
   for (int c = 0; c < 3; ++c) append(to, static_cast<float>(x[c]));
-}
-
-std::vector<Eigen::Vector3d> positions(const FramePanel& panel) {
-  std::vector<Eigen::Vector3d> out;
-  for (const Eigen::Vector2d& uv : panel.triangles->uv) out.push_back((*panel.surface)(uv.x(), uv.y()));
-  return out;
 }
 
 struct Counts {
@@ -60,33 +57,45 @@ std::string valid_text(const std::string& name) {
   return nlohmann::json::parse(text).get<std::string>();
 }
 
+// The rotation that takes `up` to +Y: exact where `up` is an axis.
+Eigen::Matrix3d turned_upright(const Eigen::Vector3d& up) {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  const double x = up.x(), y = up.y(), z = up.z();
+  if (1 + y < 1e-12) return Eigen::Vector3d(1, -1, -1).asDiagonal();
+  // About up x Y, written out so that axes stay free of rounding.
+  turn << 1 - x * x / (1 + y), -x, -x * z / (1 + y),  //
+      x, y, z,                                        //
+      -x * z / (1 + y), -z, 1 - z * z / (1 + y);
+  return turn;
+}
+
 }  // namespace
 
 std::string format_ply(const Frame& frame) {
   const Counts sum = counts(frame);
-  std::string out = "ply\nformat binary_little_endian 1.0\ncomment toile, metres\n";
+  const std::vector<MeshVertices> meshes = mesh_vertices(frame);
+  std::string out = "ply\nformat binary_little_endian 1.0\ncomment toile, metres, axes of the scene\n";
   for (std::size_t k = 0; k < frame.panels.size(); ++k)
     out += "comment panel " + std::to_string(k) + " " + printable(frame.panels[k].name) + "\n";
+  // Readers that take lists only as a face's last property are common: the panel stands at the vertices.
   out += "element vertex " + std::to_string(sum.vertices) +
          "\nproperty double x\nproperty double y\nproperty double z\nproperty double s\nproperty double t\n"
-         "element face " +
-         std::to_string(sum.triangles) + "\nproperty list uchar int vertex_indices\nproperty int panel\nend_header\n";
-  for (const FramePanel& panel : frame.panels) {
-    const std::vector<Eigen::Vector3d> x = positions(panel);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      for (int c = 0; c < 3; ++c) append(out, x[i][c]);
-      for (int c = 0; c < 2; ++c) append(out, panel.triangles->uv[i][c]);
+         "property int panel\nelement face " +
+         std::to_string(sum.triangles) + "\nproperty list uchar int vertex_indices\nend_header\n";
+  for (std::size_t k = 0; k < meshes.size(); ++k) {
+    for (std::size_t i = 0; i < meshes[k].position.size(); ++i) {
+      for (int c = 0; c < 3; ++c) append(out, meshes[k].position[i][c]);
+      for (int c = 0; c < 2; ++c) append(out, meshes[k].texture[i][c]);
+      append(out, static_cast<std::int32_t>(k));
     }
   }
   std::int32_t first = 0;
-  for (std::size_t k = 0; k < frame.panels.size(); ++k) {
-    const TrimmedTriangles& mesh = *frame.panels[k].triangles;
-    for (const std::array<int, 3>& triangle : mesh.triangles) {
+  for (const FramePanel& panel : frame.panels) {
+    for (const std::array<int, 3>& triangle : panel.triangles->triangles) {
       append(out, std::uint8_t{3});
       for (const int vertex : triangle) append(out, static_cast<std::int32_t>(first + vertex));
-      append(out, static_cast<std::int32_t>(k));
     }
-    first += static_cast<std::int32_t>(mesh.uv.size());
+    first += static_cast<std::int32_t>(panel.triangles->uv.size());
   }
   return out;
 }
@@ -96,7 +105,8 @@ std::string format_stl(const Frame& frame) {
   out.resize(80, ' ');
   append(out, static_cast<std::uint32_t>(counts(frame).triangles));
   for (const FramePanel& panel : frame.panels) {
-    const std::vector<Eigen::Vector3d> x = positions(panel);
+    std::vector<Eigen::Vector3d> x;
+    for (const Eigen::Vector2d& uv : panel.triangles->uv) x.push_back((*panel.surface)(uv.x(), uv.y()));
     for (const auto& [a, b, c] : panel.triangles->triangles) {
       const Eigen::Vector3d &p = x[static_cast<std::size_t>(a)], &q = x[static_cast<std::size_t>(b)],
                             &r = x[static_cast<std::size_t>(c)];
@@ -132,19 +142,21 @@ std::string format_glb(const Frame& frame) {
     binary += bytes;
     return gltf["accessors"].size() - 1;
   };
+  const Eigen::Matrix3d upright = turned_upright(frame.up);
+  const std::vector<MeshVertices> meshes = mesh_vertices(frame);
   for (std::size_t k = 0; k < frame.panels.size(); ++k) {
     const FramePanel& panel = frame.panels[k];
     const TrimmedTriangles& mesh = *panel.triangles;
     if (mesh.triangles.empty()) continue;
     std::string corners, normals, uv, indices;
     Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
-    for (const Eigen::Vector2d& p : mesh.uv) {
-      const SurfaceJet jet = evaluate(*panel.surface, p.x(), p.y());
-      low = low.cwiseMin(jet.x.cast<float>()), high = high.cwiseMax(jet.x.cast<float>());
-      append_floats(corners, jet.x);
-      const Eigen::Vector3d normal = jet.u.cross(jet.v).stableNormalized();
-      append_floats(normals, normal.norm() > 0.5 ? normal : Eigen::Vector3d(0, 0, 1));
-      for (int c = 0; c < 2; ++c) append(uv, static_cast<float>(p[c]));
+    for (std::size_t i = 0; i < mesh.uv.size(); ++i) {
+      const Eigen::Vector3d x = upright * meshes[k].position[i];
+      low = low.cwiseMin(x.cast<float>()), high = high.cwiseMax(x.cast<float>());
+      append_floats(corners, x);
+      append_floats(normals, upright * meshes[k].normal[i]);
+      append(uv, static_cast<float>(meshes[k].texture[i].x()));
+      append(uv, static_cast<float>(1 - meshes[k].texture[i].y()));
     }
     for (const std::array<int, 3>& triangle : mesh.triangles)
       for (const int vertex : triangle) append(indices, static_cast<std::uint32_t>(vertex));
@@ -177,6 +189,19 @@ std::string format_glb(const Frame& frame) {
   append(out, static_cast<std::uint32_t>(binary.size()));
   out += std::string("BIN\0", 4) + binary;
   return out;
+}
+
+FileSink::FileSink(std::filesystem::path folder, std::string ending, Format format, int next)
+    : folder_(std::move(folder)), ending_(std::move(ending)), format_(std::move(format)), next_(next) {}
+
+void FileSink::write(const Frame& frame) {
+  if (frame.number != next_)
+    throw std::logic_error("FileSink: frame " + std::to_string(frame.number) + " where " + std::to_string(next_) +
+                           " was due");
+  const std::string digits = std::to_string(frame.number);
+  const std::string name = "frame_" + std::string(digits.size() < 4 ? 4 - digits.size() : 0, '0') + digits + ending_;
+  write_file(folder_ / name, format_(frame), Flush::no);
+  ++next_;
 }
 
 }  // namespace toile

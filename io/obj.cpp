@@ -2,52 +2,62 @@
 
 #include <array>
 #include <charconv>
-#include <stdexcept>
 
-#include "io/file.h"
+#include "io/mesh_vertices.h"
 
 namespace toile {
 
 namespace {
 
-void append_number(std::string& to, double value) {
+template <class Number>
+void append_number(std::string& to, Number value) {
   std::array<char, 32> text;
   to += ' ';
   to.append(text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr);
 }
 
-// A group name is one word.
-std::string group_name(const std::string& name, std::size_t number) {
+template <class Vector>
+void append_line(std::string& to, const char* word, const Vector& x) {
+  to += word;
+  for (const auto value : x) append_number(to, value);
+  to += '\n';
+}
+
+// Names are one word.
+std::string object_name(const std::string& name, std::size_t number) {
   std::string out;
   for (const char c : name) out += static_cast<unsigned char>(c) <= ' ' ? '_' : c;
   return out.empty() ? "panel_" + std::to_string(number) : out;
 }
 
+// " 0 0 1".
+std::string axis_text(const Eigen::Vector3d& axis) {
+  std::string out;
+  for (const double value : axis) append_number(out, value);
+  return out;
+}
+
 }  // namespace
 
-std::string format_obj(const Frame& frame) {
-  std::string out = "# toile, metres\n";
+std::string format_obj(const Frame& frame, std::string_view material_file) {
+  const std::vector<MeshVertices> meshes = mesh_vertices(frame);
+  std::string out = "# toile: metres, axes of the scene, up is" + axis_text(frame.up) + "\n";
+  out += "mtllib " + std::string(material_file) + '\n';
   std::size_t first = 1;
   for (std::size_t k = 0; k < frame.panels.size(); ++k) {
     const FramePanel& panel = frame.panels[k];
-    out += "g " + group_name(panel.name, k) + '\n';
-    for (const Eigen::Vector2d& p : panel.triangles->uv) {
-      const Eigen::Vector3d x = (*panel.surface)(p[0], p[1]);
-      out += 'v';
-      for (int c = 0; c < 3; ++c) append_number(out, x[c]);
-      out += '\n';
-    }
-    for (const Eigen::Vector2d& p : panel.triangles->uv) {
-      out += "vt";
-      append_number(out, p[0]);
-      append_number(out, p[1]);
-      out += '\n';
-    }
+    // Objects for those who import by object, groups for those who import by group.
+    const std::string name = object_name(panel.name, k);
+    out += "o " + name + "\ng " + name + '\n';
+    for (const Eigen::Vector3d& x : meshes[k].position) append_line(out, "v", x);
+    for (const Eigen::Vector2d& x : meshes[k].texture) append_line(out, "vt", x);
+    for (const Eigen::Vector3d& x : meshes[k].normal) append_line(out, "vn", x.cast<float>().eval());
+    out += "usemtl cloth\ns 1\n";
     for (const std::array<int, 3>& triangle : panel.triangles->triangles) {
       out += 'f';
       for (const int vertex : triangle) {
         const std::string index = std::to_string(first + static_cast<std::size_t>(vertex));
-        out += ' ' + index + '/' + index;
+        out += ' ' + index + '/' + index + '/' + index;
       }
       out += '\n';
     }
@@ -56,16 +66,9 @@ std::string format_obj(const Frame& frame) {
   return out;
 }
 
-ObjSink::ObjSink(std::filesystem::path folder, int next) : folder_(std::move(folder)), next_(next) {}
-
-void ObjSink::write(const Frame& frame) {
-  if (frame.number != next_)
-    throw std::logic_error("ObjSink: frame " + std::to_string(frame.number) + " where " + std::to_string(next_) +
-                           " was due");
-  const std::string digits = std::to_string(frame.number);
-  const std::string name = "frame_" + std::string(digits.size() < 4 ? 4 - digits.size() : 0, '0') + digits + ".obj";
-  write_file(folder_ / name, format_obj(frame), Flush::no);
-  ++next_;
+std::string format_mtl() {
+  // A matt, light grey: seen in every program, easily replaced.
+  return "# toile\nnewmtl cloth\nKa 0.8 0.8 0.8\nKd 0.8 0.8 0.8\nKs 0 0 0\nd 1\nillum 1\n";
 }
 
 }  // namespace toile

@@ -10,175 +10,31 @@
 #include <optional>
 
 #include "geometry/error.h"
+#include "geometry/measure.h"
 #include "geometry/refine.h"
 #include "geometry/text.h"
 #include "io/flat_panel.h"
+#include "io/outline_chains.h"
+#include "io/outline_repair.h"
+#include "trimming/loops.h"
 #include "trimming/winding.h"
 
 namespace toile {
 
 namespace {
 
+using drawing::Chain;
+using drawing::Chains;
+using drawing::Piece;
+using drawing::place_text;
+using drawing::Places;
+using drawing::Step;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double join_tolerance = 1e-5;   // of the drawing's size
 constexpr double touch_tolerance = 1e-3;  // of a panel's size: a mark this near to the outline touches it
 constexpr double notch_length = 0.05;     // of a panel's size: longer marks that touch the outline are lines
-
-std::string place(const Vector3d& x) {
-  return std::string("(") + text(x.x()) + ", " + text(x.y()) + ", " + text(x.z()) + ")";
-}
-
-// Numbers for places: points nearer than the tolerance to one seen before share its number.
-class Places {
- public:
-  explicit Places(double tolerance) : tolerance_(tolerance) {}
-  int operator()(const Vector3d& x) {
-    const Cell home = cell(x);
-    for (long long a = -1; a <= 1; ++a)
-      for (long long b = -1; b <= 1; ++b)
-        for (long long c = -1; c <= 1; ++c) {
-          const auto found = cells_.find({home[0] + a, home[1] + b, home[2] + c});
-          if (found == cells_.end()) continue;
-          for (const int k : found->second)
-            if ((points_[static_cast<std::size_t>(k)] - x).norm() <= tolerance_) return k;
-        }
-    points_.push_back(x);
-    cells_[home].push_back(static_cast<int>(points_.size()) - 1);
-    return static_cast<int>(points_.size()) - 1;
-  }
-  int count() const { return static_cast<int>(points_.size()); }
-  const Vector3d& point(int k) const { return points_[static_cast<std::size_t>(k)]; }
-
- private:
-  using Cell = std::array<long long, 3>;
-  Cell cell(const Vector3d& x) const {
-    Cell c;
-    for (int k = 0; k < 3; ++k) c[static_cast<std::size_t>(k)] = std::llround(std::floor(x[k] / tolerance_));
-    return c;
-  }
-  double tolerance_;
-  std::vector<Vector3d> points_;
-  std::map<Cell, std::vector<int>> cells_;
-};
-
-struct Piece {
-  Curve3 curve;
-  int id = 0;
-  std::string name;
-  int from = 0, to = 0;    // places
-  bool of_closed = false;  // of a closed curve that became a mark
-};
-
-struct Step {
-  int piece = 0;
-  bool reversed = false;
-};
-using Chain = std::vector<Step>;
-
-// The pieces of one entity as a closed chain in their own order, where they are one: whatever else meets its corners.
-std::optional<Chain> closed_in_order(const std::vector<Piece>& pieces, std::size_t first, std::size_t count) {
-  if (count == 0) return std::nullopt;
-  for (const bool turned : {false, true}) {
-    Chain chain{{static_cast<int>(first), turned}};
-    const int start = turned ? pieces[first].to : pieces[first].from;
-    int end = turned ? pieces[first].from : pieces[first].to;
-    for (std::size_t k = first + 1; k < first + count && chain.size() == k - first; ++k) {
-      if (pieces[k].from == end) {
-        chain.push_back({static_cast<int>(k), false});
-        end = pieces[k].to;
-      } else if (pieces[k].to == end) {
-        chain.push_back({static_cast<int>(k), true});
-        end = pieces[k].from;
-      }
-    }
-    if (chain.size() == count && end == start) return chain;
-  }
-  return std::nullopt;
-}
-
-// Joins loose pieces to closed chains by their places.
-class Chains {
- public:
-  Chains(const std::vector<Piece>& pieces, std::vector<bool> used, int places, std::vector<OutlineNote>& notes)
-      : pieces_(pieces),
-        used_(std::move(used)),
-        at_(static_cast<std::size_t>(places)),
-        degree_(static_cast<std::size_t>(places), 0),
-        notes_(notes) {
-    for (std::size_t k = 0; k < pieces.size(); ++k) {
-      if (used_[k]) continue;
-      for (const int place : {pieces[k].from, pieces[k].to}) {
-        at_[static_cast<std::size_t>(place)].push_back(static_cast<int>(k));
-        ++degree_[static_cast<std::size_t>(place)];
-      }
-    }
-  }
-  std::vector<Chain> closed;
-  std::vector<int> open;  // pieces
-
-  void find(const Places& places) {
-    drop_loose_ends();
-    for (std::size_t k = 0; k < pieces_.size(); ++k)
-      if (!used_[k]) follow(static_cast<int>(k), places);
-  }
-
- private:
-  void drop_loose_ends() {
-    std::vector<int> ends(at_.size());
-    std::iota(ends.begin(), ends.end(), 0);
-    while (!ends.empty()) {
-      const int end = ends.back();
-      ends.pop_back();
-      if (degree_[static_cast<std::size_t>(end)] != 1) continue;
-      for (const int k : at_[static_cast<std::size_t>(end)]) {
-        const auto i = static_cast<std::size_t>(k);
-        if (used_[i]) continue;
-        used_[i] = true;
-        open.push_back(k);
-        for (const int place : {pieces_[i].from, pieces_[i].to}) --degree_[static_cast<std::size_t>(place)];
-        ends.push_back(pieces_[i].from == end ? pieces_[i].to : pieces_[i].from);
-      }
-    }
-  }
-  // What is left has no loose ends. Where more than two ends meet, nobody knows which of the curves is the outline.
-  void follow(int first, const Places& places) {
-    Chain chain{{first, false}};
-    used_[static_cast<std::size_t>(first)] = true;
-    const int start = pieces_[static_cast<std::size_t>(first)].from;
-    int end = pieces_[static_cast<std::size_t>(first)].to;
-    while (end != start && degree_[static_cast<std::size_t>(end)] == 2) {
-      int next = -1;
-      for (const int k : at_[static_cast<std::size_t>(end)])
-        if (!used_[static_cast<std::size_t>(k)]) next = k;
-      if (next < 0) break;  // the other part of this chain has been followed, to a fork that was noted
-      const Piece& piece = pieces_[static_cast<std::size_t>(next)];
-      used_[static_cast<std::size_t>(next)] = true;
-      chain.push_back({next, piece.from != end});
-      end = piece.from == end ? piece.to : piece.from;
-    }
-    if (end != start && degree_[static_cast<std::size_t>(end)] == 2) {
-      for (const Step& step : chain) open.push_back(step.piece);
-      return;
-    }
-    const int fork = degree_[static_cast<std::size_t>(start)] == 2 ? end : start;
-    if (end == start && degree_[static_cast<std::size_t>(start)] == 2) {
-      closed.push_back(std::move(chain));
-      return;
-    }
-    notes_.push_back(
-        {pieces_[static_cast<std::size_t>(first)].id,
-         "several curves go on from " + place(places.point(fork)) + "; those that meet there make no panel"});
-    for (const Step& step : chain) open.push_back(step.piece);
-  }
-
-  const std::vector<Piece>& pieces_;
-  std::vector<bool> used_;
-  std::vector<std::vector<int>> at_;
-  std::vector<int> degree_;  // ends that are left at each place
-  std::vector<OutlineNote>& notes_;
-};
 
 // A plane with coordinates: x = origin + u du + v dv, du and dv orthonormal.
 struct Plane {
@@ -191,16 +47,20 @@ struct Plane {
 Plane plane_of(const std::vector<Piece>& pieces, const Chain& chain) {
   // Newell's sum over the control polygon, from a point of it: the rounding of far-away drawings cancels.
   const Vector3d base = pieces[static_cast<std::size_t>(chain[0].piece)].curve.points().col(0);
-  Vector3d sum(0, 0, 0), last(0, 0, 0);
+  Vector3d sum(0, 0, 0), last(0, 0, 0), widest(0, 0, 0), crosswise(0, 0, 0);
   const auto visit = [&](const Vector3d& x) {
     sum += last.cross(x - base);
     last = x - base;
+    if (widest.cross(last).squaredNorm() > crosswise.squaredNorm()) crosswise = widest.cross(last);
+    if (last.squaredNorm() > widest.squaredNorm()) widest = last;
   };
   for (const Step& step : chain) {
     const Eigen::Matrix3Xd& p = pieces[static_cast<std::size_t>(step.piece)].curve.points();
     for (Eigen::Index k = 0; k < p.cols(); ++k) visit(p.col(step.reversed ? p.cols() - 1 - k : k));
   }
   Plane plane;
+  // An outline that crosses itself may enclose as much on one side as on the other: any three of its points then.
+  if (!(sum.norm() > 1e-9 * widest.squaredNorm())) sum = crosswise;
   plane.normal = sum.stableNormalized();
   int axis = 0;
   plane.normal.cwiseAbs().maxCoeff(&axis);
@@ -313,6 +173,7 @@ class Finder {
     // Coordinates far from the origin are no finer than their rounding.
     const double reach = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
     tolerance_ = std::max({resolution, join_tolerance * (high - low).norm(), 64 * 2.3e-16 * reach});
+    harmless_ = harmless_steps * std::max(resolution, step_of(curves));
     Places places(tolerance_);
     std::vector<Chain> closed;
     std::vector<bool> used;
@@ -328,7 +189,7 @@ class Finder {
             (piece.curve.points().colwise() - piece.curve.points().col(0)).colwise().norm().maxCoeff() <= tolerance_;
         if (!nothing) pieces_.push_back(std::move(piece));
       }
-      std::optional<Chain> chain = closed_in_order(pieces_, first, pieces_.size() - first);
+      std::optional<Chain> chain = drawing::closed_in_order(pieces_, first, pieces_.size() - first);
       used.resize(pieces_.size(), chain.has_value());
       if (chain) closed.push_back(std::move(*chain));
     }
@@ -337,28 +198,37 @@ class Finder {
     open_ = std::move(chains.open);
     for (std::vector<Chain>* list : {&closed, &chains.closed})
       for (Chain& chain : *list) add_loop(std::move(chain));
+    slit_pieces_ = std::move(chains.slits);
+    if (loops_.empty() && out_.notes.empty()) explain(chains.loose, places);
   }
 
   Outlines find() {
     nest();
     make_panels();
     add_marks();
+    add_slits();
     choose_grain();
     return std::move(out_);
   }
 
  private:
+  static double step_of(const std::vector<LooseCurve>& curves);
+  void explain(const std::vector<std::pair<int, int>>& loose, const Places& places);
   void add_loop(Chain chain);
+  void add_repaired(Loop loop, std::vector<TrimCurve> curves);
   void nest();
   void make_panels();
   void add_marks();
+  void add_slits();
   void choose_grain();
   int panel_at(const Vector3d& x) const;
   void add_mark(const Piece& piece);
 
   const std::vector<LoosePoint>& points_;
-  double tolerance_ = 0;
+  double tolerance_ = 0, harmless_ = 0;
   std::vector<Piece> pieces_;
+  std::vector<int> slit_pieces_;
+  std::vector<std::pair<int, Curve2>> slits_;  // of outlines, with their plane
   std::vector<int> open_;
   std::vector<Plane> planes_;
   std::vector<Loop> loops_;
@@ -366,6 +236,40 @@ class Finder {
   std::vector<std::vector<std::size_t>> candidates_;  // marks of each panel that may be its grain line
   Outlines out_;
 };
+
+double Finder::step_of(const std::vector<LooseCurve>& curves) {
+  std::vector<Vector2d> points;
+  for (const LooseCurve& loose : curves) {
+    for (const Curve3& c : loose.pieces) {
+      if (c.degree() != 1) continue;
+      for (Eigen::Index k = 0; k < c.points().cols(); ++k) {
+        points.emplace_back(c.points().col(k).head<2>());
+        points.emplace_back(c.points()(2, k), 0);
+      }
+    }
+  }
+  return points.empty() ? 0 : decimal_step(points);
+}
+
+// Nothing is closed: the two loose ends nearest to each other are the likeliest place of the fault.
+void Finder::explain(const std::vector<std::pair<int, int>>& loose, const Places& places) {
+  constexpr std::size_t most = 500;
+  if (loose.size() < 2 || loose.size() > most) return;
+  double gap = std::numeric_limits<double>::infinity();
+  std::pair<std::size_t, std::size_t> ends;
+  for (std::size_t i = 0; i < loose.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double d = (places.point(loose[i].first) - places.point(loose[j].first)).norm();
+      if (d < gap) gap = d, ends = {j, i};
+    }
+  }
+  out_.notes.push_back({pieces_[static_cast<std::size_t>(loose[ends.second].second)].id,
+                        "the outline is open: it ends at " + place_text(places.point(loose[ends.second].first)) +
+                            ", the nearest other end is " + text(gap) + " away at " +
+                            place_text(places.point(loose[ends.first].first)) + " (ends nearer than " +
+                            text(tolerance_) + " are joined)",
+                        true});
+}
 
 void Finder::add_loop(Chain chain) {
   // From the smallest id on.
@@ -395,12 +299,31 @@ void Finder::add_loop(Chain chain) {
   loop.plane = static_cast<int>(same - planes_.begin());
   if (same == planes_.end()) planes_.push_back(plane);
   const Plane& in = planes_[static_cast<std::size_t>(loop.plane)];
-  loop.low.setConstant(std::numeric_limits<double>::infinity());
-  loop.high = -loop.low;
+  std::vector<TrimCurve> curves;
   for (const Step& step : chain) {
     TrimCurve trim;
     trim.curve = in_plane(in, pieces_[static_cast<std::size_t>(step.piece)].curve);
     if (step.reversed) trim.curve = reversed(trim.curve);
+    trim.index = static_cast<int>(curves.size());
+    curves.push_back(std::move(trim));
+  }
+  RepairedOutline repaired = repair_outline(std::move(curves), {tolerance_, harmless_});
+  for (const OutlineChange& change : repaired.changes)
+    out_.notes.push_back({loop.id, change.what + ", at (" + text(change.at.x()) + ", " + text(change.at.y()) + ")"});
+  for (Curve2& slit : repaired.slits) slits_.emplace_back(loop.plane, std::move(slit));
+  if (repaired.loops.empty()) return leave_out("the closed outline encloses nothing; it makes no panel");
+  loop.chain = std::move(chain);
+  for (std::vector<TrimCurve>& outline : repaired.loops) {
+    add_repaired(loop, std::move(outline));
+    loop.chain.clear();
+  }
+}
+
+// One closed chain; curve K is its K-th.
+void Finder::add_repaired(Loop loop, std::vector<TrimCurve> curves) {
+  loop.low.setConstant(std::numeric_limits<double>::infinity());
+  loop.high = -loop.low;
+  for (TrimCurve& trim : curves) {
     trim.index = static_cast<int>(loop.curves.size());
     loop.low = loop.low.cwiseMin(trim.curve.points().rowwise().minCoeff());
     loop.high = loop.high.cwiseMax(trim.curve.points().rowwise().maxCoeff());
@@ -414,7 +337,6 @@ void Finder::add_loop(Chain chain) {
     next.u[0] = loop.spans[k].last().x();
     next.v[0] = loop.spans[k].last().y();
   }
-  loop.chain = std::move(chain);
   loops_.push_back(std::move(loop));
 }
 
@@ -459,13 +381,17 @@ void Finder::make_panels() {
     for (const Loop& hole : loops_)
       if (hole.depth == loop.depth + 1 && hole.parent == static_cast<int>(k)) bounds.push_back(hole.curves);
     try {
+      for (const std::vector<TrimCurve>& bound : bounds)
+        if (const std::string crossing = self_crossing(bound); !crossing.empty()) throw GeometryError(crossing);
       TrimmedSurface face = flat_panel(std::move(bounds), planes_[static_cast<std::size_t>(loop.plane)].map);
       face.name = loop.name;
+      TrimmedSurface valid = face;
+      validate_loops(valid);
       out_.panels.push_back(std::move(face));
       out_.ids.push_back(loop.id);
       outer_.push_back(static_cast<int>(k));
     } catch (const GeometryError& error) {
-      out_.notes.push_back({loop.id, std::string(error.what()) + "; it makes no panel"});
+      out_.notes.push_back({loop.id, std::string(error.what()) + "; it makes no panel", true});
     }
   }
 }
@@ -537,6 +463,29 @@ void Finder::add_marks() {
                                                                            : MarkKind::drill;
     mark.text = point.text.empty() ? point.name : point.text;
     out_.panels[static_cast<std::size_t>(panel)].marks.push_back(std::move(mark));
+  }
+}
+
+void Finder::add_slits() {
+  const auto add = [&](int panel, Curve2 curve) {
+    if (panel < 0) return;  // outside of every panel: what the outline overshot
+    PanelMark mark;
+    mark.kind = MarkKind::slit;
+    mark.at = curve.start();
+    mark.curve = std::move(curve);
+    out_.panels[static_cast<std::size_t>(panel)].marks.push_back(std::move(mark));
+  };
+  for (auto& [plane, slit] : slits_) {
+    const AffinePatch& map = planes_[static_cast<std::size_t>(plane)].map;
+    const Vector2d p = middle(slit);
+    add(panel_at(map.origin + p.x() * map.du + p.y() * map.dv), std::move(slit));
+  }
+  for (const int k : slit_pieces_) {
+    const Curve3& curve = pieces_[static_cast<std::size_t>(k)].curve;
+    const int panel = panel_at(curve(curve.domain().min + curve.domain().length() / 2));
+    if (panel < 0) continue;
+    const Loop& loop = loops_[static_cast<std::size_t>(outer_[static_cast<std::size_t>(panel)])];
+    add(panel, in_plane(planes_[static_cast<std::size_t>(loop.plane)], curve));
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
+#include <optional>
 
 #include "geometry/error.h"
 #include "geometry/refine.h"
@@ -9,6 +11,8 @@
 #include "io/file.h"
 #include "io/flat_panel.h"
 #include "io/json_document.h"
+#include "io/outline_repair.h"
+#include "trimming/loops.h"
 
 namespace toile {
 
@@ -17,6 +21,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::uintmax_t max_bytes = std::uintmax_t{64} << 20;
+constexpr double rounding_step = 1e-9;  // of numbers with all the digits of a double: patterns are some 100 units large
 
 class PatternReader {
  public:
@@ -24,12 +29,11 @@ class PatternReader {
   void read(const JsonValue& root);
 
  private:
-  [[noreturn]] void fail(const JsonValue& at, const std::string& what) const {
-    throw InputError(name_ + ":" + std::to_string(at.line) + ": " + where_ + what);
+  std::string message(const JsonValue& at, const std::string& what) const {
+    return name_ + ":" + std::to_string(at.line) + ": " + where_ + what;
   }
-  void warn(const JsonValue& at, const std::string& what) {
-    out_.file.warnings.push_back(name_ + ":" + std::to_string(at.line) + ": " + where_ + what);
-  }
+  [[noreturn]] void fail(const JsonValue& at, const std::string& what) const { throw InputError(message(at, what)); }
+  void warn(const JsonValue& at, const std::string& what) { out_.file.warnings.push_back(message(at, what)); }
   const JsonValue& expect(const JsonValue& value, JsonValue::Kind kind, const std::string& what) const {
     JsonValue wanted;
     wanted.kind = kind;
@@ -47,13 +51,32 @@ class PatternReader {
   Eigen::Matrix<double, N, 1> vector(const JsonValue& value, const std::string& what) const;
 
   void properties(const JsonValue& root);
+  struct Edges {
+    std::vector<std::vector<TrimCurve>> chains;
+    std::vector<int> first_of_chain;  // of each edge of the file: the number of its chain's first edge
+    double step = 0;                  // of the file's numbers
+  };
+  struct ReadPanel {
+    TrimmedSurface face;
+    PatternPlace place;
+    std::vector<PatternEdge> edges;  // panel -1: left out
+    GluePanel glue;
+  };
   void panel(const std::string& name, const JsonValue& value);
+  ReadPanel read_panel(const std::string& name, const JsonValue& value);
+  Edges edges_of(const std::string& panel, const JsonValue& value);
+  std::vector<std::vector<TrimCurve>> loops_of(const JsonValue& value, Edges edges, std::vector<PanelMark>& marks);
   Curve2 edge(const JsonValue& value, const Vector2d& a, const Vector2d& b);
   Curve2 curved(const JsonValue& value, const Vector2d& a, const Vector2d& b,
                 const std::vector<Vector2d>& params) const;
   Curve2 arc(const JsonValue& value, const Vector2d& a, const Vector2d& b, const JsonValue& params) const;
   void stitch(const JsonValue& value);
-  PatternEdge side(const JsonValue& value) const;
+  std::optional<PatternEdge> edge_of(const JsonValue& value);
+  std::vector<PatternEdge> side(const JsonValue& value);
+  double length(const PatternEdge& edge) const;
+  void share_out(std::vector<std::vector<PatternEdge>> sides, Stitch& stitch) const;
+  std::vector<GluePart> parts(const std::vector<PatternEdge>& side) const;
+  void check_gluing();
 
   const std::string& name_;
   Pattern& out_;
@@ -62,6 +85,11 @@ class PatternReader {
   bool absolute_ = false;                        // control points in the panel's own coordinates
   bool labels_ = false, objects_ = false;        // what only the second dialect has
   std::vector<std::vector<PatternEdge>> edges_;  // per panel; panel -1: left out
+  std::vector<GluePanel> glue_;                  // likewise
+  std::vector<std::string> refused_;             // names
+  std::exception_ptr first_refusal_;
+  const std::vector<JsonValue>* stitches_ = nullptr;
+  std::vector<int> numbers_;  // in the file, of out_.stitches
 };
 
 double PatternReader::number(const JsonValue& value, const std::string& what) const {
@@ -170,40 +198,32 @@ Curve2 PatternReader::edge(const JsonValue& value, const Vector2d& a, const Vect
   return curved(value, a, b, points);
 }
 
-void PatternReader::panel(const std::string& name, const JsonValue& value) {
-  where_ = "panel '" + name + "': ";
-  expect(value, JsonValue::Kind::object, "a panel");
-  labels_ = labels_ || value.find("label");
+// The edges of a panel as closed chains; a curve's index is the number of its edge.
+PatternReader::Edges PatternReader::edges_of(const std::string& panel, const JsonValue& value) {
   std::vector<Vector2d> vertices;
   for (const JsonValue& item : member(value, "vertices", JsonValue::Kind::array).items)
     vertices.push_back(vector<2>(item, "vertex " + std::to_string(vertices.size())));
-  PatternPlace place;
-  if (const JsonValue* v = value.find("translation"))
-    place.translate = vector<3>(*v, "'translation'") / units_in_metre_;
-  if (const JsonValue* v = value.find("rotation")) place.rotate_deg = vector<3>(*v, "'rotation'");
-
   const JsonValue& edges = member(value, "edges", JsonValue::Kind::array);
   if (edges.items.empty()) fail(edges, "it has no edges");
-  const int number_of_panel = static_cast<int>(out_.file.panels.size());
-  std::vector<PatternEdge> places;
-  std::vector<std::vector<TrimCurve>> loops(1);
+  Edges out;
+  out.step = decimal_step(vertices);
+  out.chains.emplace_back();
   Vector2d first(0, 0), last(0, 0);
-  int in_loop = 0;  // edges of this loop so far, those without length included
+  int start = 0;  // of this chain
   for (std::size_t k = 0; k < edges.items.size(); ++k) {
     const JsonValue& item = edges.items[k];
-    where_ = "panel '" + name + "': edge " + std::to_string(k) + ": ";
+    where_ = "panel '" + panel + "': edge " + std::to_string(k) + ": ";
     expect(item, JsonValue::Kind::object, "an edge");
     const JsonValue& ends = member(item, "endpoints", JsonValue::Kind::array);
     if (ends.items.size() != 2) fail(ends, "'endpoints' must be two vertex numbers");
     if (vertices.empty()) fail(ends, "the panel has no vertices");
     const Vector2d from = vertices[static_cast<std::size_t>(index(ends.items[0], vertices.size(), "an endpoint"))];
     const Vector2d to = vertices[static_cast<std::size_t>(index(ends.items[1], vertices.size(), "an endpoint"))];
-    TrimCurve trim;
     bool against = false;
-    if (in_loop > 0 && from != last) {
+    if (static_cast<int>(k) > start && from != last) {
       if (last == first) {
-        loops.emplace_back();  // the loop is complete: this edge begins a hole
-        in_loop = 0;
+        out.chains.emplace_back();  // the chain is complete: this edge begins a hole
+        start = static_cast<int>(k);
       } else if (to == last) {
         warn(item, "it runs against its neighbours; it is taken the other way round");
         against = true;
@@ -212,80 +232,249 @@ void PatternReader::panel(const std::string& name, const JsonValue& value) {
                        text(last.x()) + ", " + text(last.y()) + ")");
       }
     }
-    if (in_loop == 0) first = from;
-    trim.index = in_loop++;
+    if (static_cast<int>(k) == start) first = from;
     last = against ? from : to;
+    out.first_of_chain.push_back(start);
     if (from == to) {
       warn(item, "it has no length and is left out");
-      places.push_back({-1, 0, 0});
       continue;
     }
-    places.push_back({number_of_panel, static_cast<int>(loops.size()) - 1, trim.index});
+    TrimCurve trim;
+    trim.index = static_cast<int>(k);
     trim.curve = edge(item, from, to);
     if (against) trim.curve = reversed(trim.curve);
-    loops.back().push_back(std::move(trim));
+    out.chains.back().push_back(std::move(trim));
   }
-  where_ = "panel '" + name + "': ";
+  where_ = "panel '" + panel + "': ";
   if (last != first)
     fail(edges, "its edges don't close: they end at (" + text(last.x()) + ", " + text(last.y()) + ") and start at (" +
                     text(first.x()) + ", " + text(first.y()) + ")");
-  for (int k = static_cast<int>(loops.size()) - 1; k >= 0; --k) {
-    if (!loops[static_cast<std::size_t>(k)].empty()) continue;
-    loops.erase(loops.begin() + k);  // every edge of it was without length
-    for (PatternEdge& p : places) p.loop -= p.loop > k;
+  std::erase_if(out.chains, [](const auto& chain) { return chain.empty(); });
+  return out;
+}
+
+// Slits and harmless crossings go, with a warning each; what still crosses itself makes no panel.
+std::vector<std::vector<TrimCurve>> PatternReader::loops_of(const JsonValue& value, Edges edges,
+                                                            std::vector<PanelMark>& marks) {
+  const double step = std::max(edges.step, rounding_step);
+  std::vector<std::vector<TrimCurve>> loops;
+  for (std::vector<TrimCurve>& chain : edges.chains) {
+    RepairedOutline repaired = repair_outline(std::move(chain), {rounding_step, harmless_steps * step});
+    for (const OutlineChange& change : repaired.changes)
+      warn(value, change.what + ", at (" + text(change.at.x()) + ", " + text(change.at.y()) + ")");
+    for (Curve2& slit : repaired.slits) {
+      PanelMark mark;
+      mark.kind = MarkKind::slit;
+      mark.at = slit.start();
+      mark.curve = std::move(slit);
+      marks.push_back(std::move(mark));
+    }
+    for (std::vector<TrimCurve>& loop : repaired.loops) {
+      if (const std::string crossing = self_crossing(loop); !crossing.empty())
+        throw GeometryError(message(value, crossing));
+      loops.push_back(std::move(loop));
+    }
   }
+  if (loops.empty()) throw GeometryError(message(value, "its edges enclose nothing"));
   // The outer loop is number 0; it is the largest.
-  if (loops.size() > 1) {
-    const auto largest =
-        std::ranges::max_element(loops, {}, [](const auto& loop) { return std::abs(polygon_area(loop)); });
-    const int at = static_cast<int>(largest - loops.begin());
-    std::rotate(loops.begin(), largest, largest + 1);
-    for (PatternEdge& p : places) p.loop = p.loop == at ? 0 : p.loop < at ? p.loop + 1 : p.loop;
+  const auto largest =
+      std::ranges::max_element(loops, {}, [](const auto& loop) { return std::abs(polygon_area(loop)); });
+  std::rotate(loops.begin(), largest, largest + 1);
+  return loops;
+}
+
+PatternReader::ReadPanel PatternReader::read_panel(const std::string& name, const JsonValue& value) {
+  where_ = "panel '" + name + "': ";
+  expect(value, JsonValue::Kind::object, "a panel");
+  labels_ = labels_ || value.find("label");
+  ReadPanel out;
+  if (const JsonValue* v = value.find("translation"))
+    out.place.translate = vector<3>(*v, "'translation'") / units_in_metre_;
+  if (const JsonValue* v = value.find("rotation")) out.place.rotate_deg = vector<3>(*v, "'rotation'");
+  const Edges edges = edges_of(name, value);
+  std::vector<PanelMark> marks;
+  std::vector<std::vector<TrimCurve>> loops = loops_of(value, edges, marks);
+  out.edges.resize(edges.first_of_chain.size(), {-1, 0, 0});
+  for (std::size_t l = 0; l < loops.size(); ++l) {
+    for (TrimCurve& trim : loops[l]) {
+      const auto k = static_cast<std::size_t>(trim.index);
+      trim.index -= edges.first_of_chain[k];
+      out.edges[k] = {static_cast<int>(out_.file.panels.size()), static_cast<int>(l), trim.index};
+    }
   }
   const double mm = 1000 / units_in_metre_;
-  TrimmedSurface face;
   try {
-    face = flat_panel(std::move(loops), {{0, 0, 0}, {mm, 0, 0}, {0, mm, 0}, 0});
+    out.face = flat_panel(std::move(loops), {{0, 0, 0}, {mm, 0, 0}, {0, mm, 0}, 0});
   } catch (const GeometryError& error) {
     fail(value, error.what());
   }
-  face.name = name;
-  face.metres_per_unit = 1e-3;
-  face.resolution = out_.file.resolution;
-  face.source = name_ + ":" + std::to_string(value.line);
-  out_.file.panels.push_back(std::move(face));
-  out_.places.push_back(place);
-  edges_.push_back(std::move(places));
+  out.face.name = name;
+  out.face.metres_per_unit = 1e-3;
+  out.face.resolution = out_.file.resolution;
+  out.face.source = name_ + ":" + std::to_string(value.line);
+  out.face.marks = std::move(marks);
+  TrimmedSurface valid = out.face;
+  validate_loops(valid);
+  for (const TrimLoop& loop : out.face.loops) {
+    const auto same = std::ranges::find(valid.loops, loop.index, &TrimLoop::index);
+    GlueLoop glued;
+    glued.material_left = same == valid.loops.end() || !same->curves.front().reversed;
+    for (const TrimCurve& trim : loop.curves) glued.lengths.push_back(arc_length(trim.curve, trim.curve.domain()));
+    out.glue.loops.push_back(std::move(glued));
+  }
+  return out;
 }
 
-PatternEdge PatternReader::side(const JsonValue& value) const {
+// A panel that can't be is left out; the others stay.
+void PatternReader::panel(const std::string& name, const JsonValue& value) {
+  try {
+    ReadPanel read = read_panel(name, value);
+    out_.file.panels.push_back(std::move(read.face));
+    out_.places.push_back(read.place);
+    edges_.push_back(std::move(read.edges));
+    glue_.push_back(std::move(read.glue));
+  } catch (const Error& error) {
+    if (!first_refusal_) first_refusal_ = std::current_exception();
+    out_.file.refused.emplace_back(error.what());
+    refused_.push_back(name);
+  }
+}
+
+// Nothing where the edge is none of a panel that was read.
+std::optional<PatternEdge> PatternReader::edge_of(const JsonValue& value) {
   expect(value, JsonValue::Kind::object, "a side");
   const JsonValue& name = member(value, "panel", JsonValue::Kind::string);
   const JsonValue& number = member(value, "edge", JsonValue::Kind::number);
+  if (std::ranges::find(refused_, name.text) != refused_.end()) {
+    warn(value, "panel '" + name.text + "' is left out, and with it what is sewn to it");
+    return std::nullopt;
+  }
   const auto found = std::ranges::find(out_.file.panels, name.text, &TrimmedSurface::name);
   if (found == out_.file.panels.end()) fail(name, "there is no panel '" + name.text + "'");
   const auto& edges = edges_[static_cast<std::size_t>(found - out_.file.panels.begin())];
-  return edges[static_cast<std::size_t>(index(number, edges.size(), "'edge' of panel '" + name.text + "'"))];
+  const PatternEdge edge =
+      edges[static_cast<std::size_t>(index(number, edges.size(), "'edge' of panel '" + name.text + "'"))];
+  if (edge.panel >= 0) return edge;
+  warn(value, "edge " + text(number.number) + " of panel '" + name.text +
+                  "' has no length or is a slit; nothing is sewn to it");
+  return std::nullopt;
+}
+
+std::vector<PatternEdge> PatternReader::side(const JsonValue& value) {
+  std::vector<PatternEdge> out;
+  if (value.kind == JsonValue::Kind::array) {
+    for (const JsonValue& item : value.items)
+      if (const auto edge = edge_of(item)) out.push_back(*edge);
+  } else if (const auto edge = edge_of(value)) {
+    out.push_back(*edge);
+  }
+  return out;
+}
+
+double PatternReader::length(const PatternEdge& edge) const {
+  const auto& loop = out_.file.panels[static_cast<std::size_t>(edge.panel)].loops[static_cast<std::size_t>(edge.loop)];
+  const auto at = std::ranges::find(loop.curves, edge.curve, &TrimCurve::index) - loop.curves.begin();
+  return glue_[static_cast<std::size_t>(edge.panel)]
+      .loops[static_cast<std::size_t>(edge.loop)]
+      .lengths[static_cast<std::size_t>(at)];
+}
+
+// One edge against all others: the first, unless the last is nearer to them in length.
+void PatternReader::share_out(std::vector<std::vector<PatternEdge>> sides, Stitch& stitch) const {
+  const auto gap = [&](std::size_t one) {
+    double all = 0;
+    for (const auto& side : sides)
+      for (const PatternEdge& edge : side) all += length(edge);
+    double alone = 0;
+    for (const PatternEdge& edge : sides[one]) alone += length(edge);
+    return std::abs(all - 2 * alone);
+  };
+  const bool last = sides.size() > 2 && gap(sides.size() - 1) < gap(0) * (1 - 1e-6);
+  const std::size_t one = last ? sides.size() - 1 : 0;
+  stitch.a = sides[one];
+  for (std::size_t k = 0; k < sides.size(); ++k)
+    if (k != one) stitch.b.insert(stitch.b.end(), sides[k].begin(), sides[k].end());
 }
 
 void PatternReader::stitch(const JsonValue& value) {
   expect(value, JsonValue::Kind::array, "a stitch");
-  // GarmentCode may add a word after the two sides.
-  std::vector<const JsonValue*> sides;
-  for (const JsonValue& item : value.items)
-    if (item.kind != JsonValue::Kind::string && item.kind != JsonValue::Kind::boolean) sides.push_back(&item);
-  if (sides.size() < 2) fail(value, "it has " + std::to_string(sides.size()) + " sides, must have 2");
-  if (sides.size() > 2) {
-    warn(value, "it joins " + std::to_string(sides.size()) + " edges and is left out; write one stitch a pair");
-    return;
+  Stitch stitch;
+  stitch.line = value.line;
+  std::vector<std::vector<PatternEdge>> sides;
+  std::size_t written = 0;
+  for (const JsonValue& item : value.items) {
+    if (item.kind == JsonValue::Kind::string && item.text == "right_wrong") {
+      stitch.reverse = false;
+    } else if (item.kind == JsonValue::Kind::string) {
+      warn(item, "the word \"" + item.text + "\" is not known (\"right_wrong\" is) and ignored");
+    } else if (item.kind != JsonValue::Kind::boolean) {
+      ++written;
+      sides.push_back(side(item));
+    }
   }
-  const PatternEdge a = side(*sides[0]), b = side(*sides[1]);
-  if (a.panel < 0 || b.panel < 0) {
-    warn(value, "one of its edges has no length; it is left out");
-    return;
+  if (written < 2) fail(value, "it has " + std::to_string(written) + " sides, must have 2");
+  std::erase_if(sides, [](const auto& side) { return side.empty(); });
+  if (sides.size() < 2) return;  // said why
+  const auto same = [](const PatternEdge& x, const PatternEdge& y) {
+    return x.panel == y.panel && x.loop == y.loop && x.curve == y.curve;
+  };
+  for (std::size_t i = 0; i < sides.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      for (const PatternEdge& x : sides[i])
+        if (std::ranges::any_of(sides[j], [&](const PatternEdge& y) { return same(x, y); }))
+          fail(value, "it joins an edge with itself");
+  share_out(std::move(sides), stitch);
+  numbers_.push_back(static_cast<int>(&value - stitches_->data()));
+  out_.stitches.push_back(std::move(stitch));
+}
+
+std::vector<GluePart> PatternReader::parts(const std::vector<PatternEdge>& side) const {
+  std::vector<GluePart> out;
+  for (const PatternEdge& e : side) {
+    const auto& loop = out_.file.panels[static_cast<std::size_t>(e.panel)].loops[static_cast<std::size_t>(e.loop)];
+    const auto at = std::ranges::find(loop.curves, e.curve, &TrimCurve::index) - loop.curves.begin();
+    out.push_back({e.panel, e.loop, static_cast<int>(at)});
   }
-  if (a.panel == b.panel && a.loop == b.loop && a.curve == b.curve) fail(value, "it joins an edge with itself");
-  out_.stitches.push_back({a, b, value.line});
+  return out;
+}
+
+// Glues the garment: what is no surface is no garment that could be worn.
+void PatternReader::check_gluing() {
+  if (out_.stitches.empty()) return;
+  std::vector<GlueSeam> seams;
+  for (const Stitch& stitch : out_.stitches) seams.push_back({parts(stitch.a), parts(stitch.b), stitch.reverse});
+  out_.gluing = glue(glue_, seams);
+  const auto say = [&](int stitch, const std::string& what) {
+    out_.file.warnings.push_back(name_ + ":" + std::to_string(out_.stitches[static_cast<std::size_t>(stitch)].line) +
+                                 ": stitch " + std::to_string(numbers_[static_cast<std::size_t>(stitch)]) + ": " +
+                                 what);
+  };
+  for (const Gluing::Oversewn& o : out_.gluing.oversewn) {
+    const TrimmedSurface& face = out_.file.panels[static_cast<std::size_t>(o.edge.panel)];
+    const TrimCurve& trim =
+        face.loops[static_cast<std::size_t>(o.edge.loop)].curves[static_cast<std::size_t>(o.edge.edge)];
+    std::string others;
+    for (const int s : o.seams)
+      others += (others.empty() ? "" : ", ") + std::to_string(numbers_[static_cast<std::size_t>(s)]);
+    say(o.seams.back(), "curve " + std::to_string(o.edge.loop) + "," + std::to_string(trim.index) + " of panel '" +
+                            face.name + "' is sewn more than once (stitches " + others +
+                            "): more than two layers meet there, the garment is no surface");
+  }
+  for (const int s : out_.gluing.twisted) {
+    if (!out_.stitches[static_cast<std::size_t>(s)].reverse) continue;  // right side to wrong side, as it says
+    say(s,
+        "with the stitches before it, it closes a band with a half twist: the garment has no right side. A stitch "
+        "joins the start of one edge to the end of the other unless it says \"right_wrong\"");
+  }
+  for (const GluedPiece& piece : out_.gluing.pieces) {
+    if (piece.panels.size() == 1 && piece.euler + piece.borders == 2) continue;  // nothing sewn, or a closed dart
+    out_.file.notes.push_back(name_ + ": glued by its stitches, " + std::to_string(piece.panels.size()) +
+                              " panels are one piece: Euler characteristic " + std::to_string(piece.euler) + ", " +
+                              std::to_string(piece.borders) + " borders, " +
+                              (!piece.manifold    ? "no surface"
+                               : piece.orientable ? "orientable"
+                                                  : "not orientable"));
+  }
 }
 
 void PatternReader::read(const JsonValue& root) {
@@ -298,14 +487,16 @@ void PatternReader::read(const JsonValue& root) {
   const JsonValue& panels = member(pattern, "panels", JsonValue::Kind::object);
   for (const auto& [name, value] : panels.members) panel(name, value);
   where_.clear();
+  if (out_.file.panels.empty() && first_refusal_) std::rethrow_exception(first_refusal_);
   if (out_.file.panels.empty()) fail(panels, "the pattern has no panels");
   const JsonValue* stitches = pattern.find("stitches");
   if (stitches && stitches->kind != JsonValue::Kind::null) {
-    expect(*stitches, JsonValue::Kind::array, "'stitches'");
+    stitches_ = &expect(*stitches, JsonValue::Kind::array, "'stitches'").items;
     for (std::size_t k = 0; k < stitches->items.size(); ++k) {
       where_ = "stitch " + std::to_string(k) + ": ";
       stitch(stitches->items[k]);
     }
+    check_gluing();
   }
   out_.soles_at_zero = objects_ || labels_;
 }

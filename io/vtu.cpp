@@ -1,11 +1,8 @@
 #include "io/vtu.h"
 
-#include <zlib.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <charconv>
 #include <cstdint>
 #include <cstring>
@@ -14,37 +11,18 @@
 #include <type_traits>
 
 #include "geometry/refine.h"
+#include "geometry/text.h"
 #include "io/file.h"
 #include "io/polyline.h"
+#include "io/vtu_arrays.h"
+#include "io/xml_text.h"
 
 namespace toile {
 
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "VTU files are written as little endian");
-
 // Cell types of VTK.
 constexpr std::uint8_t vtk_vertex = 1, vtk_line = 3, vtk_poly_line = 4, vtk_triangle = 5, vtk_bezier_quad = 77;
-
-std::string number(double value) {
-  std::array<char, 32> text;
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 // The arrays of one section (PointData, Cells, ...), in the order in which they came.
 template <class T>
@@ -72,43 +50,18 @@ struct Grid {
   std::int32_t next_point() const { return static_cast<std::int32_t>(points.size()); }
 };
 
-// Appends `bytes` as VTK wants compressed data: the number of blocks, the size of a block and of a last shorter one,
-// the compressed sizes, then a zlib stream a block. A block whose first bytes hardly shrink, such as most numbers that
-// were computed, is stored: deflating it would cost its time and save nothing.
-void append_compressed(std::string& to, std::string_view bytes) {
-  constexpr std::size_t block = std::size_t{1} << 16, probe = std::size_t{1} << 12;
-  const auto deflated = [](std::string_view part, int level) {
-    uLongf size = compressBound(part.size());
-    std::string out(size, '\0');
-    if (compress2(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(part.data()), part.size(),
-                  level) != Z_OK)
-      throw std::bad_alloc();  // the one reason left: the output fits and the level exists
-    out.resize(size);
-    return out;
-  };
-  std::vector<std::uint64_t> head{(bytes.size() + block - 1) / block, block, bytes.size() % block};
-  std::string body;
-  for (std::size_t first = 0; first < bytes.size(); first += block) {
-    const std::string_view part = bytes.substr(first, block), start = part.substr(0, probe);
-    const bool shrinks = deflated(start, Z_BEST_SPEED).size() < start.size() - start.size() / 8;
-    const std::string packed = deflated(part, shrinks ? Z_BEST_SPEED : Z_NO_COMPRESSION);
-    head.push_back(packed.size());
-    body += packed;
-  }
-  to.append(reinterpret_cast<const char*>(head.data()), head.size() * sizeof head[0]).append(body);
-}
-
 // XML head with offsets, and behind it the compressed arrays.
 class Writer {
  public:
   std::string finish(const Grid& grid, double time) {
     head_ =
         "<?xml version=\"1.0\"?>\n"
-        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" "
-        "compressor=\"vtkZLibDataCompressor\">\n"
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" " +
+        std::string(vtu_storage) +
+        ">\n"
         "<UnstructuredGrid>\n<FieldData>\n<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" "
         "format=\"ascii\">" +
-        number(time) +
+        text(time) +
         "</DataArray>\n</FieldData>\n"
         "<Piece NumberOfPoints=\"" +
         std::to_string(grid.points.size()) + "\" NumberOfCells=\"" + std::to_string(grid.types.size()) + "\">\n";
@@ -120,7 +73,7 @@ class Writer {
     array("connectivity", 1, grid.connectivity.data(), grid.connectivity.size());
     array("offsets", 1, grid.offsets.data(), grid.offsets.size());
     array("types", 1, grid.types.data(), grid.types.size());
-    head_ += "</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
+    head_ += "</Cells>\n</Piece>\n</UnstructuredGrid>\n" + std::string(vtu_data_mark);
     return std::move(head_) + body_ + "\n</AppendedData>\n</VTKFile>\n";
   }
 
@@ -135,9 +88,8 @@ class Writer {
 
   template <class T>
   void array(const std::string& name, int components, const T* values, std::size_t count) {
-    head_ += std::string("<DataArray type=\"") + type_name<T>() + "\" Name=\"" + name + "\" NumberOfComponents=\"" +
-             std::to_string(components) + "\" format=\"appended\" offset=\"" + std::to_string(body_.size()) + "\"/>\n";
-    append_compressed(body_, {reinterpret_cast<const char*>(values), count * sizeof(T)});
+    append_vtu_array(head_, body_, type_name<T>(), name, components,
+                     {reinterpret_cast<const char*>(values), count * sizeof(T)});
   }
 
   template <class... Arrays>
@@ -228,6 +180,19 @@ void add_field(Grid& grid, const Frame& frame, std::vector<Eigen::Matrix<double,
   }
 }
 
+// The larger of weft and warp strain, as preview.png shows it: the active scalars, so that programs which colour what
+// they open by these show strain at once.
+void add_strain(Grid& grid, const Frame& frame) {
+  Array<float> strain{"strain", 1, {}};
+  for (const FramePanel& panel : frame.panels) {
+    if (panel.fields.strain.size() != panel.triangles->uv.size()) return;
+    for (const Eigen::Vector3d& e : panel.fields.strain)
+      strain.values.push_back(static_cast<float>(std::max(e[0], e[1])));
+  }
+  grid.point_fields.push_back(std::move(strain));
+  grid.point_attributes = " Scalars=\"strain\"";
+}
+
 Grid triangle_block(const Frame& frame) {
   Grid grid;
   const bool moving = all_panels_have_velocity(frame);
@@ -263,7 +228,8 @@ Grid triangle_block(const Frame& frame) {
       panel_number.values.push_back(static_cast<std::int32_t>(k));
     }
   }
-  grid.point_attributes = " Normals=\"normal\"";
+  add_strain(grid, frame);
+  grid.point_attributes += " Normals=\"normal\"";
   add_field<3>(grid, frame, &FrameFields::strain, {"strain_weft", "strain_warp", "strain_shear"});
   add_field<3>(grid, frame, &FrameFields::second_pk, {"second_pk_weft", "second_pk_warp", "second_pk_shear"});
   add_field<2>(grid, frame, &FrameFields::nominal, {"nominal_stress_weft", "nominal_stress_warp"});
@@ -387,44 +353,55 @@ VtuBlocks format_vtu(const Frame& frame) {
           Writer().finish(point_block(frame), frame.time)};
 }
 
-VtuSink::VtuSink(std::filesystem::path folder, std::string name, std::vector<double> written)
-    : folder_(std::move(folder)), name_(std::move(name)), times_(std::move(written)) {}
+namespace {
+
+// Of frames that a resumed run has made before and that are here.
+std::vector<PvdIndex::Entry> entries_of(const std::filesystem::path& folder, const std::string& name,
+                                        const std::vector<double>& written, const char* ending) {
+  std::vector<PvdIndex::Entry> out;
+  for (std::size_t k = 0; k < written.size(); ++k) {
+    const std::string file = name + '_' + four_digits(static_cast<int>(k)) + ending;
+    if (std::filesystem::exists(folder / file)) out.push_back({written[k], file});
+  }
+  return out;
+}
+
+constexpr const char* cloth_ending = "/triangles.vtu";
+
+}  // namespace
+
+VtuSink::VtuSink(std::filesystem::path folder, std::string name, const std::vector<double>& written)
+    : folder_(std::move(folder)),
+      name_(std::move(name)),
+      next_(static_cast<int>(written.size())),
+      cloth_(folder_ / (name_ + ".pvd"), entries_of(folder_, name_, written, cloth_ending)),
+      parts_(folder_ / (name_ + "_parts.pvd"), entries_of(folder_, name_, written, ".vtm")) {}
 
 void VtuSink::write(const Frame& frame) {
-  if (frame.number != static_cast<int>(times_.size()))
-    throw std::logic_error("VtuSink: frame " + std::to_string(frame.number) + " where " +
-                           std::to_string(times_.size()) + " was due");
+  if (frame.number != next_)
+    throw std::logic_error("VtuSink: frame " + std::to_string(frame.number) + " where " + std::to_string(next_) +
+                           " was due");
   const std::string stem = name_ + '_' + four_digits(frame.number);
   const VtuBlocks blocks = format_vtu(frame);
-  const std::array<std::pair<const char*, const std::string*>, 5> parts{{{"surface", &blocks.surface},
-                                                                         {"triangles", &blocks.triangles},
+  const std::array<std::pair<const char*, const std::string*>, 5> parts{{{"triangles", &blocks.triangles},
+                                                                         {"surface", &blocks.surface},
                                                                          {"net", &blocks.net},
                                                                          {"trims", &blocks.trims},
                                                                          {"points", &blocks.points}}};
-  // Parts first, the index that names them last.
+  // Parts first, the indices that name them last.
   std::string index =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<vtkMultiBlockDataSet>\n";
   for (std::size_t k = 0; k < parts.size(); ++k) {
     const std::string part = parts[k].first;
     write_file(folder_ / stem / (part + ".vtu"), *parts[k].second, Flush::no);
-    index += "<DataSet index=\"" + std::to_string(k) + "\" name=\"" + part + "\" file=\"" + escaped(stem) + '/' + part +
-             ".vtu\"/>\n";
+    index += "<DataSet index=\"" + std::to_string(k) + "\" name=\"" + part + "\" file=\"" + xml_text(stem) + '/' +
+             part + ".vtu\"/>\n";
   }
   write_file(folder_ / (stem + ".vtm"), index + "</vtkMultiBlockDataSet>\n</VTKFile>\n", Flush::no);
-
-  std::vector<double> times = times_;
-  times.push_back(frame.time);
-  std::string collection =
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
-      "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<Collection>\n";
-  for (std::size_t k = 0; k < times.size(); ++k) {
-    const std::string file = name_ + '_' + four_digits(static_cast<int>(k)) + ".vtm";
-    if (!std::filesystem::exists(folder_ / file)) continue;
-    collection += "<DataSet timestep=\"" + number(times[k]) + "\" part=\"0\" file=\"" + escaped(file) + "\"/>\n";
-  }
-  write_file(folder_ / (name_ + ".pvd"), collection + "</Collection>\n</VTKFile>\n", Flush::no);
-  times_ = std::move(times);
+  parts_.append({frame.time, stem + ".vtm"});
+  cloth_.append({frame.time, stem + cloth_ending});
+  ++next_;
 }
 
 }  // namespace toile

@@ -24,6 +24,13 @@ std::string face_names(const PanelFile& file) {
   return names;
 }
 
+// What the file means and can't be: one of it may be what is looked for.
+std::string refusals(const PanelFile& file) {
+  std::string out;
+  for (const std::string& reason : file.refused) out += "\n  left out: " + reason;
+  return out;
+}
+
 const TrimmedSurface* by_name(const PanelFile& file, const std::string& name) {
   const auto it = std::ranges::find(file.panels, name, &TrimmedSurface::name);
   return it == file.panels.end() ? nullptr : &*it;
@@ -37,8 +44,8 @@ const TrimmedSurface& select_face(const PanelFile& file, const ScenePanel& panel
     if (const TrimmedSurface* face = by_name(file, panel.name + std::string(flat_suffix))) return *face;
     const bool anonymous = std::ranges::all_of(file.panels, [](const TrimmedSurface& f) { return f.name.empty(); });
     if (file.panels.size() > 1 && !anonymous) {
-      throw InputError(fmt::format("{}: no face of {} is called '{}'; it has {}", panel.where, file.path, panel.name,
-                                   face_names(file)));
+      throw InputError(fmt::format("{}: no face of {} is called '{}'; it has {}{}", panel.where, file.path, panel.name,
+                                   face_names(file), refusals(file)));
     }
   }
   if (panel.order >= static_cast<int>(file.panels.size())) {
@@ -212,7 +219,7 @@ struct PanelParts {
 };
 
 PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule sampling,
-                       std::vector<std::string>& warnings) {
+                       std::vector<std::string>& warnings, std::vector<std::string>& notes) {
   const std::string who = fmt::format("{}: panel '{}'", panel.where, panel.name);
   PanelParts parts;
   BuiltPanel& built = parts.built;
@@ -224,7 +231,7 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule
   const double unit = built.face.metres_per_unit;
   built.repairs = validate_loops(built.face);
   for (const LoopRepair& repair : built.repairs) {
-    warnings.push_back(fmt::format("{}: loop {}: {}", who, repair.loop, repair.what));
+    (repair.note ? notes : warnings).push_back(fmt::format("{}: loop {}: {}", who, repair.loop, repair.what));
   }
   built.topology = trace_trims(built.face);
   close_seams(built, who, warnings);
@@ -298,13 +305,20 @@ Build build(Scene scene) {
   result.scene = std::move(scene);
   const Clock::time_point reading = Clock::now();
   std::vector<std::size_t> file_of;
+  std::vector<PanelChoice> choices;  // of result.files
   for (const ScenePanel& panel : result.scene.panels) {
     const std::string path = panel.file.string();
-    auto it = std::ranges::find(result.files, path, &PanelFile::path);
+    auto it = result.files.begin();
+    while (it != result.files.end() &&
+           !(it->path == path && choices[static_cast<std::size_t>(it - result.files.begin())] == panel.choice))
+      ++it;
     if (it == result.files.end()) {
-      result.files.push_back(read_panels(panel.file));
+      result.files.push_back(read_panels(panel.file, panel.choice));
       result.files.back().path = path;
+      choices.push_back(panel.choice);
       for (const std::string& warning : result.files.back().warnings) result.warnings.push_back(warning);
+      for (const std::string& note : result.files.back().notes) result.notes.push_back(note);
+      for (const std::string& refusal : result.files.back().refused) result.warnings.push_back("left out: " + refusal);
       it = result.files.end() - 1;
     }
     file_of.push_back(static_cast<std::size_t>(it - result.files.begin()));
@@ -318,7 +332,7 @@ Build build(Scene scene) {
   int count = 0;
   for (std::size_t k = 0; k < file_of.size(); ++k) {
     PanelParts parts = build_panel(result.files[file_of[k]], result.scene.panels[k], result.scene.strain_limit.points,
-                                   result.warnings);
+                                   result.warnings, result.notes);
     for (int row = 0; row < parts.dependence.outerSize(); ++row) {
       for (AffineMap::Matrix::InnerIterator it(parts.dependence, row); it; ++it) {
         dependence.emplace_back(count + static_cast<int>(it.row()), count + static_cast<int>(it.col()), it.value());
@@ -396,13 +410,15 @@ Build build(Scene scene) {
   for (const SceneSeam& seam : result.scene.seams) {
     for (const SeamSide& side : {seam.a, seam.b}) {
       const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(side.panel))];
-      const bool there = std::ranges::any_of(panel.face.loops, [&](const TrimLoop& loop) {
-        return loop.index == side.loop &&
-               std::ranges::find(loop.curves, side.curve, &TrimCurve::index) != loop.curves.end();
-      });
-      if (!there) {
-        throw GeometryError(
-            fmt::format("{}: [[seam]]: panel '{}' has no curve {},{}", seam.where, side.panel, side.loop, side.curve));
+      for (const int curve : side.curves) {
+        const bool there = std::ranges::any_of(panel.face.loops, [&](const TrimLoop& loop) {
+          return loop.index == side.loop &&
+                 std::ranges::find(loop.curves, curve, &TrimCurve::index) != loop.curves.end();
+        });
+        if (!there) {
+          throw GeometryError(
+              fmt::format("{}: [[seam]]: panel '{}' has no curve {},{}", seam.where, side.panel, side.loop, curve));
+        }
       }
     }
   }

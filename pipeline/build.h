@@ -49,9 +49,10 @@ struct Build {
   std::unique_ptr<ShellModel> model;
   AffineMap::Matrix dependence;  // of all control points
   Eigen::VectorXd start;         // 3 n [m]
-  Eigen::VectorXd mass_floor;    // n [kg]: 0.01 of density times cell area (design.md, "Small cut cells")
+  Eigen::VectorXd mass_floor;    // n [kg]: 0.01 of density times cell area
   Loads loads;
   std::vector<std::string> warnings;
+  std::vector<std::string> notes;  // decisions that say nothing against the scene or its files
   double read_seconds = 0, trim_seconds = 0;
 
   int panel(const std::string& name) const;  // by the scene's name; must exist

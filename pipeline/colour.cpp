@@ -63,6 +63,15 @@ Eigen::Vector3f strain_colour(double s) {
   return (1 - t) * table[k] + t * table[k + 1];
 }
 
+Eigen::Vector3f signed_colour(double s) {
+  const double amount = std::clamp(std::abs(s), 0.0, 1.0);
+  const double hue = (s < 0 ? 258 : 52) * std::numbers::pi / 180;
+  // The chroma that sRGB holds at every lightness on the way.
+  const double lightness = 0.95 - 0.45 * amount, chroma = 0.125 * amount;
+  const Eigen::Vector3d lab(lightness, chroma * std::cos(hue), chroma * std::sin(hue));
+  return oklab_to_linear(lab).cwiseMax(0).cwiseMin(1).cast<float>();
+}
+
 int to_srgb(float linear) {
   const float x = std::clamp(linear, 0.0f, 1.0f);
   const float y = x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f;

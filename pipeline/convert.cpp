@@ -3,15 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <limits>
+#include <map>
 #include <numbers>
 
 #include "geometry/error.h"
 #include "io/mesh_files.h"
+#include "io/net_files.h"
 #include "io/obj.h"
+#include "io/panel_file.h"
 #include "io/vtu.h"
+#include "pipeline/scene.h"
+#include "pipeline/toml_table.h"
 #include "trimming/triangulation.h"
 
 namespace toile {
@@ -63,8 +67,9 @@ std::string refined_iges(const PanelFile& file, const InspectOptions& options) {
   return all ? text : std::string();
 }
 
-std::string iges_text(const PanelFile& file, const std::string& name, const InspectOptions& options, Conversion& out) {
-  if (!file.file || file.panels.empty()) return new_iges(file, options, name, out);
+std::string iges_text(const PanelFile& file, const std::string& name, const InspectOptions& options, bool some,
+                      Conversion& out) {
+  if (!file.file || file.panels.empty() || some) return new_iges(file, options, name, out);
   if (!asks(options)) {
     out.notes.push_back("every record is the source's own");
     return format_iges(file);
@@ -81,82 +86,202 @@ std::string iges_text(const PanelFile& file, const std::string& name, const Insp
   return new_iges(file, options, name, out);
 }
 
-// Panels as they lie in the file, in metres, with their triangles.
-struct MeshedPanels {
-  std::vector<TrimmedSurface> faces;
-  std::vector<NurbsSurface> surfaces;
-  std::vector<TrimmedTriangles> triangles;
-  std::vector<std::vector<ConstraintPoint>> points;
+// The panels asked for; all where none is.
+std::vector<std::size_t> chosen(const PanelFile& file, const std::vector<std::string>& only) {
+  std::vector<std::string> names;
+  for (const TrimmedSurface& panel : file.panels) names.push_back(panel.name);
+  for (const std::string& name : only) {
+    if (std::ranges::find(names, name) == names.end())
+      throw InputError(fmt::format("{}: no panel is called '{}'{}", file.path, name, suggestion(name, names)));
+  }
+  std::vector<std::size_t> out;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    if (only.empty() || std::ranges::find(only, names[k]) != only.end()) out.push_back(k);
+  }
+  return out;
+}
+
+bool same_domain(const TrimmedSurface& a, const TrimmedSurface& b) {
+  if (!(a.surface.u() == b.surface.u() && a.surface.v() == b.surface.v() && a.surface.weights() == b.surface.weights()))
+    return false;
+  return std::ranges::equal(a.loops, b.loops, [](const TrimLoop& l, const TrimLoop& m) {
+    return l.kind == m.kind && std::ranges::equal(l.curves, m.curves, [](const TrimCurve& c, const TrimCurve& d) {
+             return c.curve == d.curve && c.reversed == d.reversed;
+           });
+  });
+}
+
+// The panel whose pattern this one has: "front flat" for "front draped", else itself.
+std::size_t pattern_of(const PanelFile& file, std::size_t k) {
+  const std::string& name = file.panels[k].name;
+  if (!name.ends_with(draped_suffix)) return k;
+  const std::string flat = name.substr(0, name.size() - draped_suffix.size()) + std::string(flat_suffix);
+  for (std::size_t i = 0; i < file.panels.size(); ++i) {
+    if (file.panels[i].name == flat && same_domain(file.panels[i], file.panels[k])) return i;
+  }
+  return k;
+}
+
+// A panel with a valid trim, in metres, and its triangles.
+struct MeshedPanel {
+  TrimmedSurface face;
+  NurbsSurface surface;
+  TrimmedTriangles triangles;
+  std::vector<ConstraintPoint> points;
+};
+
+MeshedPanel mesh(const TrimmedSurface& panel, const InspectOptions& options, Conversion& conversion) {
+  MeshedPanel out{panel, {}, {}, {}};
+  out.face.surface = refined(panel, options);
+  for (const LoopRepair& repair : validate_loops(out.face))
+    (repair.note ? conversion.details : conversion.warnings)
+        .push_back(fmt::format("panel '{}': loop {}: {}", panel.name, repair.loop, repair.what));
+  const TrimTopology topology = trace_trims(out.face);
+  out.triangles = triangulate(out.face, topology);
+  out.points = constraint_points(out.face, topology);
+  const NurbsSurface& surface = out.face.surface;
+  out.surface = surface.with_points(panel.metres_per_unit * surface.points());
+  return out;
+}
+
+// A drape on the triangles of its pattern.
+MeshedPanel mesh_like(const TrimmedSurface& panel, const MeshedPanel& pattern, const InspectOptions& options) {
+  MeshedPanel out = pattern;
+  const NurbsSurface surface = refined(panel, options);
+  out.face.name = panel.name;
+  out.face.surface = surface;
+  out.surface = surface.with_points(panel.metres_per_unit * surface.points());
+  return out;
+}
+
+// The chosen panels and the patterns that they need, and what a frame shows of them.
+struct Meshes {
+  std::map<std::size_t, MeshedPanel> of_panel;
   std::vector<FramePanel> panels;
 };
 
-void mesh(const PanelFile& file, const InspectOptions& options, MeshedPanels& out, Conversion& conversion) {
+Meshes mesh(const PanelFile& file, const std::vector<std::size_t>& chosen, const InspectOptions& options,
+            Conversion& conversion) {
+  Meshes out;
   std::size_t count = 0;
   double smallest_angle = std::numbers::pi, shortest = std::numeric_limits<double>::infinity(), longest = 0;
-  for (const TrimmedSurface& panel : file.panels) {
-    TrimmedSurface face = panel;
-    face.surface = refined(face, options);
-    for (const LoopRepair& repair : validate_loops(face))
-      conversion.warnings.push_back(fmt::format("panel '{}': loop {}: {}", face.name, repair.loop, repair.what));
-    const TrimTopology topology = trace_trims(face);
-    out.triangles.push_back(triangulate(face, topology));
-    const TrimmedTriangles& triangles = out.triangles.back();
-    count += triangles.triangles.size();
-    smallest_angle = std::min(smallest_angle, triangles.quality.smallest_angle);
-    shortest = std::min(shortest, face.metres_per_unit * triangles.quality.shortest_edge);
-    longest = std::max(longest, face.metres_per_unit * triangles.quality.longest_edge);
-    out.points.push_back(constraint_points(face, topology));
-    out.surfaces.push_back(face.surface.with_points(face.metres_per_unit * face.surface.points()));
-    out.faces.push_back(std::move(face));
-  }
-  for (std::size_t k = 0; k < out.faces.size(); ++k) {
+  for (const std::size_t k : chosen) {
+    const std::size_t pattern = pattern_of(file, k);
+    if (out.of_panel.count(pattern) == 0)
+      out.of_panel.emplace(pattern, mesh(file.panels[pattern], options, conversion));
+    if (pattern != k) out.of_panel.emplace(k, mesh_like(file.panels[k], out.of_panel.at(pattern), options));
+    const MeshedPanel& meshed = out.of_panel.at(k);
+    const TriangleQuality& quality = meshed.triangles.quality;
+    count += meshed.triangles.triangles.size();
+    smallest_angle = std::min(smallest_angle, quality.smallest_angle);
+    shortest = std::min(shortest, meshed.face.metres_per_unit * quality.shortest_edge);
+    longest = std::max(longest, meshed.face.metres_per_unit * quality.longest_edge);
     FramePanel panel;
-    panel.name = out.faces[k].name;
-    panel.surface = &out.surfaces[k];
-    panel.face = &out.faces[k];
-    panel.triangles = &out.triangles[k];
-    panel.points = out.points[k];
+    panel.name = meshed.face.name;
+    panel.surface = &meshed.surface;
+    panel.flat = &out.of_panel.at(pattern).surface;
+    panel.face = &meshed.face;
+    panel.triangles = &meshed.triangles;
+    panel.points = meshed.points;
     out.panels.push_back(std::move(panel));
   }
   conversion.notes.push_back(
       fmt::format("{} triangles in {} panels, metres; smallest angle {:.3g} degrees, edges {:.3g} to {:.3g} m", count,
                   out.panels.size(), smallest_angle * 180 / std::numbers::pi, shortest, longest));
+  return out;
 }
 
-using Format = std::string (*)(const Frame&);
-Format mesh_format(const std::string& ending) {
-  static constexpr std::array<std::pair<const char*, Format>, 5> formats{
-      {{".obj", format_obj},
-       {".ply", format_ply},
-       {".stl", format_stl},
-       {".glb", format_glb},
-       {".vtu", [](const Frame& frame) { return format_vtu(frame).triangles; }}}};
-  const auto found = std::ranges::find(formats, ending, [](const auto& f) { return std::string_view(f.first); });
-  return found == formats.end() ? nullptr : found->second;
+// Nets need no valid trim: they are written as they are.
+std::string net_text(const PanelFile& file, const std::vector<std::size_t>& chosen, const InspectOptions& options,
+                     bool json) {
+  std::vector<NurbsSurface> surfaces;
+  for (const std::size_t k : chosen) {
+    const NurbsSurface surface = refined(file.panels[k], options);
+    surfaces.push_back(surface.with_points(file.panels[k].metres_per_unit * surface.points()));
+  }
+  std::vector<FramePanel> panels;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    FramePanel& panel = panels.emplace_back();
+    panel.name = file.panels[chosen[i]].name;
+    panel.surface = &surfaces[i];
+    panel.face = &file.panels[chosen[i]];
+  }
+  const Frame frame{0, 0, panels};
+  return json ? format_net_json(frame) : format_net_csv(frame);
+}
+
+std::filesystem::path material_path(std::filesystem::path target) {
+  return target.replace_extension(".mtl");
+}
+
+std::string mesh_text(const Frame& frame, const std::string& ending, const std::filesystem::path& target) {
+  if (ending == ".obj") return format_obj(frame, material_path(target).filename().string());
+  if (ending == ".ply") return format_ply(frame);
+  if (ending == ".stl") return format_stl(frame);
+  if (ending == ".glb") return format_glb(frame);
+  return format_vtu(frame).triangles;
+}
+
+Eigen::Vector3d up_of(const PanelFile& file, const ConvertOptions& options) {
+  if (options.up) return *options.up;
+  if (file.up) return *file.up;
+  return file.file ? Eigen::Vector3d::UnitZ() : Eigen::Vector3d::UnitY();
 }
 
 }  // namespace
 
-Conversion convert(const PanelFile& file, const std::filesystem::path& target, const InspectOptions& options) {
+std::optional<Eigen::Vector3d> axis_named(std::string_view word) {
+  const double sign = word.starts_with('-') ? -1 : 1;
+  if (word.starts_with('-') || word.starts_with('+')) word.remove_prefix(1);
+  if (word.size() != 1 || word[0] < 'x' || word[0] > 'z') return std::nullopt;
+  return Eigen::Vector3d(sign * Eigen::Vector3d::Unit(word[0] - 'x'));
+}
+
+std::vector<std::filesystem::path> conversion_targets(const std::filesystem::path& out) {
+  if (ending_of(out) == ".obj") return {out, material_path(out)};
+  return {out};
+}
+
+Conversion convert(const PanelFile& source, const std::filesystem::path& target, const ConvertOptions& options) {
   const std::string ending = ending_of(target);
-  const bool iges = ending == ".igs" || ending == ".iges";
-  const Format format = mesh_format(ending);
-  if (!iges && !format && ending != ".svg") {
-    throw InputError(fmt::format("{}: can't write '{}' files; use .igs, .svg, .obj, .ply, .stl, .glb or .vtu",
-                                 target.string(), ending));
+  const auto is = [&](std::initializer_list<std::string_view> endings) {
+    return std::ranges::find(endings, ending) != endings.end();
+  };
+  const bool iges = is({".igs", ".iges"});
+  if (!iges && !is({".svg", ".obj", ".ply", ".stl", ".glb", ".vtu", ".json", ".csv"})) {
+    throw InputError(
+        fmt::format("{}: can't write '{}' files; use .igs, .svg, .obj, .ply, .stl, .glb, .vtu, .json or .csv",
+                    target.string(), ending));
   }
+  PanelFile file = source;
+  leave_out_invalid(file);
   if (file.panels.empty() && !iges) throw InputError(fmt::format("{}: holds no face and no surface", file.path));
+  const std::vector<std::size_t> panels = chosen(file, options.only);
+  const bool some = panels.size() < file.panels.size();
   Conversion out;
   out.warnings = file.warnings;
-  if (iges) {
-    out.bytes = iges_text(file, target.stem().string(), options, out);
-  } else if (format) {
-    MeshedPanels meshed;
-    mesh(file, options, meshed, out);
-    out.bytes = format({0, 0, meshed.panels});
+  out.details = file.notes;
+  out.refused = file.refused;
+  out.panels = panels.size();
+  if (iges || is({".svg"})) {
+    PanelFile part = file;
+    if (some) part.panels.clear();
+    for (std::size_t k = 0; some && k < panels.size(); ++k) part.panels.push_back(file.panels[panels[k]]);
+    if (iges) {
+      out.bytes = iges_text(part, target.stem().string(), options.refine, some, out);
+    } else {
+      out.bytes = print_svg(part);
+      out.notes.push_back("print at 100 %: one unit is a millimetre");
+    }
+  } else if (is({".json", ".csv"})) {
+    out.bytes = net_text(file, panels, options.refine, ending == ".json");
+    out.notes.push_back("control nets in metres");
   } else {
-    out.bytes = print_svg(file);
-    out.notes.push_back("print at 100 %: one unit is a millimetre");
+    const Meshes meshes = mesh(file, panels, options.refine, out);
+    const Frame frame{0, 0, meshes.panels, up_of(file, options)};
+    out.bytes = mesh_text(frame, ending, target);
+    if (ending == ".obj") out.beside.emplace_back(material_path(target), format_mtl());
+    if (ending == ".glb") out.notes.push_back("turned so that +Y is up");
   }
   return out;
 }

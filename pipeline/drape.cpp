@@ -14,10 +14,12 @@
 #include "pipeline/build.h"
 #include "pipeline/checkpoint.h"
 #include "pipeline/exit_code.h"
+#include "pipeline/history.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/json_text.h"
 #include "pipeline/output.h"
 #include "pipeline/run.h"
+#include "pipeline/summary.h"
 #include "pipeline/version.h"
 
 namespace toile {
@@ -97,25 +99,6 @@ bool holds(const std::filesystem::path& directory, const std::filesystem::path& 
   return std::filesystem::equivalent(directory, std::filesystem::absolute(file).parent_path(), error);
 }
 
-// The limit is held at its points; where the cloth between them is strained much farther, they lie too far apart.
-std::string strained_between_points(const StrainLimit& limit, const StateMeasures& measures) {
-  constexpr double much = 3, fold = 10;  // a fold within a span looks squeezed, and is no worse than the span
-  if (!limit.on) return {};
-  for (int d : {0, 1}) {
-    const StrainBand& band = d == 0 ? limit.weft : limit.warp;
-    const auto told = [&](double allowed, const char* how, double seen) {
-      return fmt::format(
-          "between the points that hold the limit of {:.2g}, the {} is {} by {:.2g} and more on a thousandth of the "
-          "cloth: a smaller span holds it in more places",
-          allowed, d == 0 ? "weft" : "warp", how, seen);
-    };
-    const double stretch = measures.strain.p999[d], squeeze = -measures.strain.p001[d];
-    if (stretch > much * band.stretch) return told(band.stretch, "strained", stretch);
-    if (squeeze > fold * band.compress) return told(band.compress, "squeezed", squeeze);
-  }
-  return {};
-}
-
 }  // namespace
 
 int drape(Scene scene, const DrapeOptions& options, Console& console) {
@@ -125,6 +108,8 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   const Build built = build(std::move(scene));
   built.model->use_threads(options.threads);
   for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& note : built.notes) console.detail(note);
+  for (const std::string& note : built.scene.notes) console.note(note);
   for (std::size_t k = 0; k < built.panels.size(); ++k) console.detail(describe(built, k));
   // What can be refused is refused before anything is written.
   RunResult result;
@@ -145,8 +130,12 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
       std::ranges::all_of(built.scene.panels, [](const ScenePanel& p) { return p.fabric.bending.twist == 0; });
   if (twist_free) log << "twist stiffness is 0, as in the paper's bending law\n";
   for (const std::string& warning : built.warnings) log << "warning: " << warning << "\n";
+  for (const std::string& note : built.notes) log << note << "\n";
 
   FrameWriter writer(built, directory, result.frame_times);
+  const std::filesystem::path former =
+      options.resume ? std::filesystem::absolute(*options.resume).parent_path() / "history.csv" : "";
+  History history(built, directory / "history.csv", former, result);
   const SceneMark mark = scene_mark(built);
   const Clock::time_point start = Clock::now();
   Clock::time_point saved = start;
@@ -157,13 +146,13 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   };
   const InterruptGuard guard;
   RunHooks hooks;
-  hooks.allocations = options.allocations;
   hooks.stop = [&] {
     if (guard.asked()) return RunExit::interrupted;
     const auto& limit = built.scene.time_limit;
     return limit && since(called) >= *limit ? RunExit::time_limit : RunExit::ok;
   };
   hooks.resumable = [&](const RunResult& now) {
+    history.add(now);
     if (now.steps == 0 || since(saved) >= checkpoint_seconds) save(now, *now.system);
   };
   hooks.frame = [&](const RunFrame& frame) {
@@ -211,32 +200,27 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   // The forces of a refused step are not those of the state that it started from.
   const double forces_of = result.exit == RunExit::solver_failed ? 0 : result.dt_last;
   const StateMeasures measures = measure(built, *result.system, result.state, forces_of);
-  if (const std::string between = strained_between_points(built.scene.strain_limit, measures); !between.empty()) {
+  if (const std::string between = strained_between_points(built, measures); !between.empty()) {
     result.warnings.push_back(between);
     console.warning(between);
   }
   const std::string report = json_text(report_json(built, result, measures, since(writing))) + "\n";
   write_file(directory / "report.json", report);
-  log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time\n", name(result.exit),
-                     result.steps, result.redone_steps, result.dt_min, result.dt_max, result.wall_seconds);
+  log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time, files included\n",
+                     name(result.exit), result.steps, result.redone_steps, result.dt_min, result.dt_max, since(called));
   if (!result.reason.empty()) log << result.reason << "\n";
   if (!log.flush()) throw OutputError((directory / "run.log").string() + ": not everything could be written");
 
-  console.note(fmt::format("{}: {:.3g} s in {} frames, {} steps of {:.2g} to {:.2g} s, {:.2f} s of wall time",
-                           built.scene.name, result.time, result.frames, result.steps, result.dt_min, result.dt_max,
-                           result.wall_seconds));
-  if (built.scene.rest && result.exit == RunExit::ok) {
-    console.note(fmt::format("  at rest after {} steps: let go, no point swings by more than {:.2g} m",
-                             result.relaxation.steps, result.relaxation.remaining));
-  }
-  console.note(
-      fmt::format("  strain at most {:.2g} weft, {:.2g} warp; mean {:.2g}, {:.2g}; at constraint points {:.2g}",
-                  measures.strain.max[0], measures.strain.max[1], measures.strain.mean_abs[0],
-                  measures.strain.mean_abs[1], measures.at_constraints_max));
-  console.note(fmt::format("  wrote {}", directory.string()));
+  for (const std::string& line : summary(built, result, measures, since(called))) console.note(line);
+  console.note(fmt::format("wrote {}; open", directory.string()));
+  for (const std::string& line : results_to_open(directory, built.scene.name)) console.note(line);
   if (options.json) std::fputs(report.c_str(), stdout);
   if (result.exit == RunExit::ok) return exit_ok;
   console.error(result.reason);
+  const bool stopped = result.exit == RunExit::interrupted || result.exit == RunExit::time_limit;
+  if (stopped && !options.command.empty()) {
+    console.note("to go on from here:\n  " + resume_command(options.command, directory));
+  }
   return exit_code(result.exit);
 }
 
@@ -244,6 +228,7 @@ int dry_run(Scene scene, bool json, Console& console) {
   refuse_not_simulated(scene);
   const Build built = build(std::move(scene));
   for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& note : built.scene.notes) console.note(note);
   std::unique_ptr<System> system = assemble(built, 0);
   TimeStepBound bound = time_step_bound(*built.model, *system->map, system->dynamic.node_mass, built.start);
   const double dt = planned_step(built.scene, bound);
@@ -292,7 +277,7 @@ int dry_run(Scene scene, bool json, Console& console) {
   fmt::print("limited by {} in {}: stable below {:.4g} s\n", bound.bending ? "bending" : "membrane stiffness",
              describe_cell(built, bound.cell), bound.dt);
   if (built.scene.rest) {
-    fmt::print("steps      until no point swings by more than {:.3g} m when let go, {} at most\n",
+    fmt::print("steps      until no point would move by more than {:.3g} m if released, {} at most\n",
                rest_tolerance(built), built.scene.rest->max_steps);
     fmt::print("time       about {:.2g} s a step, without frames\n", per_step);
   } else {
@@ -313,7 +298,7 @@ int check_scene(Scene scene, bool json, Console& console) {
   if (json) {
     nlohmann::ordered_json out;
     out["scene"] = built.scene.name;
-    out["valid"] = true;
+    out["valid"] = idle.empty();
     out["panels"] = nlohmann::ordered_json::array();
     for (const BuiltPanel& panel : built.panels) {
       out["panels"].push_back({{"name", panel.name},
@@ -321,13 +306,17 @@ int check_scene(Scene scene, bool json, Console& console) {
                                {"constraint_points", panel.points.size()}});
     }
     out["warnings"] = built.warnings;
+    out["notes"] = built.notes;
     out["not_simulated"] = idle;
     fmt::print("{}\n", json_text(out));
-    return exit_ok;
+    return idle.empty() ? exit_ok : exit_input;
   }
   for (const std::string& warning : built.warnings) console.warning(warning);
-  for (const std::string& reason : idle) console.warning(reason);
+  for (const std::string& note : built.notes) console.detail(note);
   for (std::size_t k = 0; k < built.panels.size(); ++k) fmt::print("{}\n", describe(built, k));
+  // What `drape` refuses isn't valid.
+  for (const std::string& reason : idle) console.error(reason);
+  if (!idle.empty()) return exit_input;
   fmt::print("{}: valid\n", built.scene.path.string());
   return exit_ok;
 }

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <optional>
+#include <string>
 
 #include "pipeline/console.h"
 #include "pipeline/scene.h"
@@ -15,8 +15,8 @@ struct DrapeOptions {
   bool overwrite = false;
   bool json = false;                            // the report on stdout
   int threads = 1;                              // of forces and tangents; any number gives the same bytes
-  std::function<long()> allocations;            // of the program so far, for the report; unset: not counted
   std::optional<std::filesystem::path> resume;  // a checkpoint to go on from
+  std::string command;  // that asked for this, to tell how to go on; without directory and checkpoint; empty: not told
 };
 
 // Runs a scene and writes its files; a scene that can't be built, and a checkpoint that doesn't fit, leave none.

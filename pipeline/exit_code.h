@@ -16,4 +16,34 @@ enum ExitCode : int {
   exit_interrupted = 130,
 };
 
+inline constexpr ExitCode all_exit_codes[] = {exit_ok,       exit_internal,   exit_usage, exit_input,
+                                              exit_geometry, exit_solver,     exit_check, exit_time_limit,
+                                              exit_output,   exit_interrupted};
+
+constexpr const char* meaning(ExitCode code) {
+  switch (code) {
+    case exit_ok:
+      return "done";
+    case exit_internal:
+      return "an error inside the program, or out of memory";
+    case exit_usage:
+      return "the command line makes no sense";
+    case exit_input:
+      return "an input file is missing or invalid";
+    case exit_geometry:
+      return "the geometry is invalid: panel, loop and place are named";
+    case exit_solver:
+      return "the solver could not continue; the checkpoint holds the last good state";
+    case exit_check:
+      return "finished, but a check failed (strain limit, rest, energy, round trip, study)";
+    case exit_time_limit:
+      return "stopped by a time limit; the checkpoint holds the last state";
+    case exit_output:
+      return "output could not be written, or --overwrite is missing";
+    case exit_interrupted:
+      return "interrupted (Ctrl-C); the checkpoint holds the last state";
+  }
+  return "";
+}
+
 }  // namespace toile

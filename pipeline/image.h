@@ -21,6 +21,20 @@ struct Image {
   std::vector<Eigen::Vector3f> linear;
 };
 
+// Fills the polygons, closed from their last point to the first; where they overlap, by nonzero winding or even-odd.
+// Edges are antialiased.
+void fill_polygons(Image& image, const std::vector<std::vector<Eigen::Vector2d>>& polygons,
+                   const Eigen::Vector3f& colour, float opacity = 1, bool even_odd = false);
+
+// A line of text as shapes, y downwards from the baseline: strokes of our own font where it has every character, else
+// outlines of the machine's fonts, else strokes with boxes for what is missing.
+struct TextShape {
+  std::vector<std::vector<Eigen::Vector2f>> strokes;   // centre lines
+  std::vector<std::vector<Eigen::Vector2f>> outlines;  // closed, nonzero winding
+  float width = 0;
+};
+TextShape text_shape(std::string_view text, float size);
+
 // Text of digit height `size` [pixels], its baseline at y, from x to the right.
 void draw_text(Image& image, float x, float y, float size, std::string_view text, const Eigen::Vector3f& colour);
 float text_width(std::string_view text, float size);

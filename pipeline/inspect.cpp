@@ -1,10 +1,10 @@
 #include "pipeline/inspect.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <exception>
 #include <nlohmann/json.hpp>
@@ -58,13 +58,14 @@ int active_control_points(const NurbsSurface& surface, const TrimTopology& topol
 }
 
 // One line for each loop and kind of repair ("snapped ...", "closed ..."): the largest of them, with its move.
-std::vector<std::string> repair_warnings(const std::vector<LoopRepair>& repairs) {
+std::vector<std::string> repair_lines(const std::vector<LoopRepair>& repairs, bool notes) {
   struct Group {
     const LoopRepair* largest;
     int count = 0;
   };
   std::vector<std::pair<std::string, Group>> groups;
   for (const LoopRepair& repair : repairs) {
+    if (repair.note != notes) continue;
     const std::string key = fmt::format("{} {}", repair.loop, repair.what.substr(0, repair.what.find(' ')));
     auto group = std::ranges::find(groups, key, [](const auto& g) { return g.first; });
     if (group == groups.end()) group = groups.insert(groups.end(), {key, {&repair}});
@@ -89,8 +90,9 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   for (const TrimLoop& loop : panel.face.loops) panel.gaps.emplace_back(loop.index, gap(loop));
   const std::string who = fmt::format("panel '{}'", panel.face.name);
   panel.repairs = validate_loops(panel.face);
-  for (std::string& warning : repair_warnings(panel.repairs)) {
-    panel.warnings.push_back(fmt::format("{}: {}", who, std::move(warning)));
+  for (const bool notes : {false, true}) {
+    for (const std::string& line : repair_lines(panel.repairs, notes))
+      (notes ? panel.notes : panel.warnings).push_back(fmt::format("{}: {}", who, line));
   }
   panel.topology = trace_trims(panel.face);
   panel.points = constraint_points(panel.face, panel.topology);
@@ -98,7 +100,6 @@ InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& optio
   panel.active_control_points = active_control_points(panel.face.surface, panel.topology);
   const Closure closure = find_closure(panel.face.surface, same_place(panel.face.resolution, panel.face.surface));
   merge_over_seams(close_exactly(panel.face.surface, closure), closure, panel.points);
-  apply_rule(StrainLimit{}.points, panel.face, panel.topology, panel.points, closure);
   merge_near_points(panel.face.surface, panel.points);
   return panel;
 }
@@ -303,14 +304,12 @@ template <class Body>
 std::vector<std::exception_ptr> deal_out(std::size_t count, int threads, const Body& body) {
   if (threads <= 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   std::vector<std::exception_ptr> errors(count);
-  std::atomic<std::size_t> next = 0;
-  Workers(static_cast<int>(std::min<std::size_t>(threads, count))).run([&](int) {
-    for (std::size_t k = next++; k < count; k = next++) {
-      try {
-        body(k);
-      } catch (...) {
-        errors[k] = std::current_exception();
-      }
+  Workers(static_cast<int>(std::min<std::size_t>(threads, count))).run(static_cast<int>(count), [&](int part) {
+    const auto k = static_cast<std::size_t>(part);
+    try {
+      body(k);
+    } catch (...) {
+      errors[k] = std::current_exception();
     }
   });
   return errors;
@@ -325,10 +324,14 @@ Inspection inspect(const PanelFile& file, const InspectOptions& options) {
   out.exporter = file.exporter;
   out.entities = file.entities;
   out.warnings = file.warnings;
+  out.notes = file.notes;
+  out.refused = file.refused;
+  out.size = file.size;
+  out.sizes = file.sizes;
   out.ledger = file.ledger;
   std::vector<std::optional<InspectedPanel>> panels(file.panels.size());
-  const std::vector<std::exception_ptr> errors = deal_out(
-      panels.size(), options.threads, [&](std::size_t k) { panels[k] = inspect(file.panels[k], options); });
+  const std::vector<std::exception_ptr> errors =
+      deal_out(panels.size(), options.threads, [&](std::size_t k) { panels[k] = inspect(file.panels[k], options); });
   for (std::size_t k = 0; k < panels.size(); ++k) {
     try {
       if (errors[k]) std::rethrow_exception(errors[k]);
@@ -338,6 +341,7 @@ Inspection inspect(const PanelFile& file, const InspectOptions& options) {
       continue;
     }
     out.warnings.insert(out.warnings.end(), panels[k]->warnings.begin(), panels[k]->warnings.end());
+    out.notes.insert(out.notes.end(), panels[k]->notes.begin(), panels[k]->notes.end());
     out.panels.push_back(*std::move(panels[k]));
     panels[k].reset();
   }
@@ -408,17 +412,29 @@ nlohmann::ordered_json inspect_json(const Inspection& inspection, int threads) {
     if (error) std::rethrow_exception(error);
   nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
   for (const std::string& warning : inspection.warnings) warnings.push_back(utf8(warning));
+  nlohmann::ordered_json notes = nlohmann::ordered_json::array();
+  for (const std::string& note : inspection.notes) notes.push_back(utf8(note));
   nlohmann::ordered_json refused = nlohmann::ordered_json::array();
   for (const std::string& panel : inspection.refused) refused.push_back(utf8(panel));
-  return {{"file", utf8(inspection.file)},         {"unit", utf8(inspection.unit)},
-          {"exporter", utf8(inspection.exporter)}, {"warnings", std::move(warnings)},
-          {"entities", std::move(entities)},       {"panels", std::move(panels)},
-          {"refused", std::move(refused)},         {"ledger", ledger_json(inspection.ledger)}};
+  return {{"file", utf8(inspection.file)},
+          {"unit", utf8(inspection.unit)},
+          {"exporter", utf8(inspection.exporter)},
+          {"warnings", std::move(warnings)},
+          {"size", inspection.size},
+          {"sizes", inspection.sizes},
+          {"notes", std::move(notes)},
+          {"entities", std::move(entities)},
+          {"panels", std::move(panels)},
+          {"refused", std::move(refused)},
+          {"ledger", ledger_json(inspection.ledger)}};
 }
 
 std::string inspect_text(const Inspection& inspection, bool points) {
   std::string out = fmt::format("{}  {}{}\n", inspection.file, inspection.unit,
                                 inspection.exporter.empty() ? "" : ", written by " + inspection.exporter);
+  if (inspection.sizes.size() > 1)
+    out += fmt::format("  sizes        {} (read: {}; --size chooses)\n", fmt::join(inspection.sizes, ", "),
+                       inspection.size.empty() ? "see the warnings" : inspection.size);
   out += ledger_text(inspection.ledger);
   constexpr std::size_t shown = 12;
   for (std::size_t k = 0; k < inspection.warnings.size() && (points || k < shown); ++k) {
@@ -427,6 +443,8 @@ std::string inspect_text(const Inspection& inspection, bool points) {
   if (!points && inspection.warnings.size() > shown) {
     out += fmt::format("  and {} warnings more: -v lists all\n", inspection.warnings.size() - shown);
   }
+  for (std::size_t k = 0; points && k < inspection.notes.size(); ++k)
+    out += "  note         " + inspection.notes[k] + '\n';
   for (const std::string& panel : inspection.refused) out += "  refused      " + panel + '\n';
   if (inspection.panels.empty()) return out + "  no panel\n";
   out += overview(inspection);

@@ -17,7 +17,7 @@
 
 namespace toile {
 
-// Unset: the file's own knots. (design.md, "Refinement")
+// Unset: the file's own knots. (RefineOptions)
 struct InspectOptions {
   std::optional<int> degree;
   std::optional<double> span;  // m, largest span length
@@ -37,6 +37,7 @@ struct InspectedPanel {
   std::vector<std::pair<int, double>> gaps;  // loop of the file, largest gap as read [parameter plane]
   std::vector<LoopRepair> repairs;
   std::vector<std::string> warnings;
+  std::vector<std::string> notes;  // repairs that say nothing against the file
 };
 
 struct Inspection {
@@ -44,7 +45,10 @@ struct Inspection {
   std::map<int, int> entities;
   std::vector<LedgerEntry> ledger;    // of every entity
   std::vector<std::string> warnings;  // of the file, then of the panels
+  std::vector<std::string> notes;     // likewise
   std::vector<InspectedPanel> panels;
+  std::string size;                  // of a pattern in several: the one read
+  std::vector<std::string> sizes;    // that the file has
   std::vector<std::string> refused;  // panels without a valid trim: panel, loop and place
 };
 
@@ -58,7 +62,7 @@ nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger);
 
 // A table of the panels and their curves; `points`: with the constraint points one by one.
 std::string inspect_text(const Inspection& inspection, bool points = false);
-// The contract of design.md; threads as in InspectOptions.
+// Lengths in metres, areas in square metres, parameters as in the file; threads as in InspectOptions.
 nlohmann::ordered_json inspect_json(const Inspection& inspection, int threads = 0);
 std::string inspect_svg(const Inspection& inspection);
 std::string inspect_png(const Inspection& inspection);   // the same drawing

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <functional>
 
+#include "io/pattern_sheet.h"
 #include "io/polyline.h"
-#include "pipeline/drawing_plane.h"
 #include "pipeline/inspect.h"
 #include "pipeline/svg.h"
 
@@ -75,46 +75,16 @@ void draw_marker(Svg& svg, const Vector2d& at, PointKind kind, bool used, double
 
 // ---- from the panel to the paper ----
 
-// Two axes of space for a flat panel; for a curved one the parameters, stretched to the surface's mean lengths.
-struct Sheet {
-  std::function<Vector2d(const Vector2d&)> flat;  // parameters to the drawing plane [m], y upwards
-  bool in_space = false;
-};
-
-Sheet sheet_of(const TrimmedSurface& face) {
-  const NurbsSurface& surface = face.surface;
-  const double metre = face.metres_per_unit;
-  if (const std::optional<DrawingPlane> plane = drawing_plane(surface)) {
-    return {[&surface, metre, plane = *plane](const Vector2d& p) -> Vector2d {
-              return metre * plane(surface(p.x(), p.y()));
-            },
-            true};
-  }
-  const Interval u = surface.u().domain(), v = surface.v().domain();
-  double length_u = 0, length_v = 0;
-  constexpr int samples = 8;
-  for (int j = 0; j < samples; ++j) {
-    for (int i = 0; i < samples; ++i) {
-      const SurfaceJet jet =
-          evaluate(surface, u.min + u.length() * (i + 0.5) / samples, v.min + v.length() * (j + 0.5) / samples);
-      length_u += jet.u.norm() / (samples * samples);
-      length_v += jet.v.norm() / (samples * samples);
-    }
-  }
-  return {[metre, length_u, length_v](const Vector2d& p) -> Vector2d {
-            return metre * Vector2d(length_u * p.x(), length_v * p.y());
-          },
-          false};
-}
-
 struct Drawn {
   const InspectedPanel* panel;
-  Sheet sheet;
+  std::string title, facts;  // the lines above it
+  PatternSheet sheet;
   Vector2d low, high;     // of the whole domain on the sheet [m]
   double scale = 1;       // pixels per metre
   Vector2d origin{0, 0};  // pixel of `low`
+  Vector2d on_sheet(const Vector2d& uv) const { return face().metres_per_unit * sheet(uv); }
   Vector2d operator()(const Vector2d& uv) const {
-    const Vector2d x = scale * (sheet.flat(uv) - low);
+    const Vector2d x = scale * (on_sheet(uv) - low);
     return {origin.x() + x.x(), origin.y() - x.y()};
   }
   const TrimmedSurface& face() const { return panel->face; }
@@ -226,6 +196,36 @@ void draw_cells(Svg& svg, const Drawn& at) {
   svg.path(lines, "knot");
 }
 
+// Width that a line of text takes, on the safe side: fonts differ.
+double text_room(std::string_view words, double size) {
+  double room = 0;
+  for (const char c : words) {
+    const auto byte = static_cast<unsigned char>(c);
+    // A letter beyond ASCII, counted at its first byte, may be as wide as it is high.
+    if ((byte & 0xc0) != 0x80) room += (byte < 0x80 ? 0.62 : 1.05) * size;
+  }
+  return room;
+}
+
+// Where text stands already, so that other text keeps clear of it.
+class TakenRoom {
+ public:
+  using Box = Eigen::AlignedBox2d;
+  static Box box_of(const Vector2d& at, double size, std::string_view words, TextAnchor anchor = TextAnchor::middle) {
+    const double width = text_room(words, size);
+    const double left = anchor == TextAnchor::start ? 0 : anchor == TextAnchor::middle ? width / 2 : width;
+    const Vector2d low(at.x() - left, at.y() - 0.8 * size);
+    return {low, low + Vector2d(width, size)};
+  }
+  bool free(const Box& box) const {
+    return std::ranges::none_of(boxes_, [&](const Box& other) { return other.intersects(box); });
+  }
+  void take(const Box& box) { boxes_.push_back(box); }
+
+ private:
+  std::vector<Box> boxes_;
+};
+
 // Right of the direction of travel on paper is away from the material.
 Vector2d outwards(const Vector2d& direction) {
   return {-direction.y(), direction.x()};
@@ -244,7 +244,7 @@ double free_place(const Points& line, const Points& taken, std::initializer_list
   return best;
 }
 
-void draw_trims(Svg& svg, const Drawn& at) {
+void draw_trims(Svg& svg, const Drawn& at, TakenRoom& room) {
   struct Label {
     Vector2d place;
     double size;
@@ -264,10 +264,25 @@ void draw_trims(Svg& svg, const Drawn& at) {
       if (length(line) > 9) svg.arrow_head(middle + 0.45 * size * direction, direction, 0.9 * size, kind + "-head");
       std::vector<Vector2d> taken = marks;
       taken.push_back(middle);
-      const auto [place, way] = along(line, free_place(line, taken, {0.5, 0.44, 0.56, 0.38, 0.62}));
-      const Vector2d out = outwards(way);
-      labels.push_back({place + (0.75 + 0.45 * std::abs(out.x())) * size * out + Vector2d(0, 0.36 * size), size,
-                        fmt::format("{},{}", loop.index, curve.index), kind + "-label halo"});
+      const std::string words = fmt::format("{},{}", loop.index, curve.index);
+      const auto beside = [&](double fraction, double distance) -> Vector2d {
+        const auto [place, way] = along(line, fraction);
+        const Vector2d out = outwards(way);
+        return place + distance * (0.75 + 0.45 * std::abs(out.x())) * size * out + Vector2d(0, 0.36 * size);
+      };
+      // Beside the curve where there is room, else along it, else farther off.
+      const double first = free_place(line, taken, {0.5, 0.44, 0.56, 0.38, 0.62});
+      Vector2d place = beside(first, 1);
+      bool found = false;
+      for (const double distance : {1.0, 1.8, 2.6}) {
+        for (const double fraction : {first, 0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8}) {
+          const Vector2d here = beside(fraction, distance);
+          if (found || !room.free(TakenRoom::box_of(here, size, words))) continue;
+          place = here, found = true;
+        }
+      }
+      room.take(TakenRoom::box_of(place, size, words));
+      labels.push_back({place, size, words, kind + "-label halo"});
     }
   }
   for (const Vector2d& end : ends) svg.circle(end, 2.1, "end");
@@ -293,7 +308,7 @@ void draw_arrow(Svg& svg, const Vector2d& from, const Vector2d& to, const std::s
 }
 
 // Corners and edges as a scene addresses them; grey where the trim has taken them away.
-void draw_addresses(Svg& svg, const Drawn& at) {
+void draw_addresses(Svg& svg, const Drawn& at, TakenRoom& room) {
   const NurbsSurface& surface = at.face().surface;
   const Interval u = surface.u().domain(), v = surface.v().domain();
   const Vector2d middle = at({(u.min + u.max) / 2, (v.min + v.max) / 2});
@@ -302,8 +317,13 @@ void draw_addresses(Svg& svg, const Drawn& at) {
       const Vector2d uv(a ? u.max : u.min, b ? v.max : v.min), corner = at(uv);
       const Vector2d away((corner - middle).x() < 0 ? -1 : 1, (corner - middle).y() < 0 ? -1 : 1);
       const bool there = contains(at.face(), at.panel->topology, uv);
-      svg.text(corner + Vector2d(0, away.y() > 0 ? 38 : -30), 10, fmt::format("corner:{},{}", a, b),
-               there ? "" : "faint", away.x() < 0 ? TextAnchor::start : TextAnchor::end);
+      const std::string words = fmt::format("corner:{},{}", a, b);
+      // Inwards from the corner; on a narrow panel outwards, so that left and right keep apart.
+      const bool narrow = at.scale * (at.high - at.low).x() < 2.3 * text_room(words, 10);
+      const TextAnchor anchor = (away.x() < 0) != narrow ? TextAnchor::start : TextAnchor::end;
+      const Vector2d place = corner + Vector2d(0, away.y() > 0 ? 38 : -30);
+      svg.text(place, 10, words, there ? "" : "faint", anchor);
+      room.take(TakenRoom::box_of(place, 10, words, anchor));
     }
   }
   // Axes stand a little off the corner of the smallest parameters.
@@ -313,13 +333,17 @@ void draw_addresses(Svg& svg, const Drawn& at) {
   const Vector2d foot = origin - 17 * du - 17 * dv;
   draw_arrow(svg, foot, foot + 46 * du, "u");
   draw_arrow(svg, foot, foot + 46 * dv, "v");
+  for (const Vector2d& axis : {du, dv}) {
+    TakenRoom::Box box(foot);
+    room.take({box.extend(Vector2d(foot + 62 * axis)).min() - Vector2d(5, 5), box.max() + Vector2d(5, 5)});
+  }
   svg.circle(foot, 2, "grain");
   svg.text(foot + 56 * du + Vector2d(0, 4), 12, "u", "u-label halo");
   svg.text(foot + 56 * dv + Vector2d(0, 4), 12, "v", "v-label halo");
 }
 
 // The grain, drawn in a cell of the material near its middle: warp long, weft short.
-void draw_grain(Svg& svg, const Drawn& at) {
+void draw_grain(Svg& svg, const Drawn& at, TakenRoom& room) {
   const KnotMesh& mesh = at.panel->topology.mesh;
   Vector2d mean(0, 0), best(0, 0);
   int count = 0;
@@ -360,8 +384,13 @@ void draw_grain(Svg& svg, const Drawn& at) {
   draw_arrow(svg, centre - reach * warp, centre + reach * warp, "grain");
   svg.arrow_head(centre - reach * warp, -warp, 8, "grain");
   svg.line(centre - 0.35 * reach * weft, centre + 0.35 * reach * weft, "grain");
-  svg.text(centre + (reach + 12) * warp + Vector2d(0, 4), 10, "warp", "quiet halo");
-  svg.text(centre + (0.35 * reach + 17) * weft + Vector2d(0, 4), 10, "weft", "quiet halo");
+  // The arrows speak for themselves where their names find no room.
+  for (const auto& [words, place] : {std::pair{"warp", Vector2d(centre + (reach + 12) * warp + Vector2d(0, 4))},
+                                     {"weft", centre + (0.35 * reach + 17) * weft + Vector2d(0, 4)}}) {
+    if (!room.free(TakenRoom::box_of(place, 10, words))) continue;
+    svg.text(place, 10, words, "quiet halo");
+    room.take(TakenRoom::box_of(place, 10, words));
+  }
 }
 
 void draw_warnings(Svg& svg, const Drawn& at) {
@@ -443,6 +472,14 @@ std::string title_of(const InspectedPanel& panel, std::size_t number) {
   return panel.face.name.empty() ? fmt::format("panel_{}", number) : panel.face.name;
 }
 
+std::string facts_of(const InspectedPanel& panel, bool true_shape) {
+  const double metre = panel.face.metres_per_unit;
+  const NurbsSurface& s = panel.face.surface;
+  return fmt::format("{:.4g} m2, degree {} x {}, {} x {} control points{}", panel.measure.area * metre * metre,
+                     s.u().degree(), s.v().degree(), s.count_u(), s.count_v(),
+                     true_shape ? "" : ", drawn in its parameters");
+}
+
 struct Drawing {
   Svg svg;
   double width = 0, height = 0;
@@ -470,13 +507,14 @@ Drawing draw(const Inspection& inspection) {
   std::vector<Drawn> drawn;
   Vector2d size(0, 0);
   for (const InspectedPanel& panel : inspection.panels) {
-    Drawn at{&panel, sheet_of(panel.face), {}, {}};
+    Drawn at{&panel, title_of(panel, drawn.size()), {}, PatternSheet(panel.face.surface), {}, {}};
+    at.facts = facts_of(panel, at.sheet.true_shape());
     at.low.setConstant(1e300), at.high.setConstant(-1e300);
     const Interval u = panel.face.surface.u().domain(), v = panel.face.surface.v().domain();
     constexpr int samples = 40;
     for (int j = 0; j <= samples; ++j) {
       for (int i = 0; i <= samples; ++i) {
-        const Vector2d x = at.sheet.flat({u.min + u.length() * i / samples, v.min + v.length() * j / samples});
+        const Vector2d x = at.on_sheet({u.min + u.length() * i / samples, v.min + v.length() * j / samples});
         at.low = at.low.cwiseMin(x), at.high = at.high.cwiseMax(x);
       }
     }
@@ -490,7 +528,8 @@ Drawing draw(const Inspection& inspection) {
   for (Drawn& at : drawn) {
     at.scale = scale;
     const Vector2d box = scale * (at.high - at.low);
-    const double wide = std::max(box.x(), 230.0) + 2 * margin;
+    const double words = std::max(text_room(at.title, 14), text_room(at.facts, 10));
+    const double wide = std::max(std::max(box.x(), 230.0) + 2 * margin, words + 24);
     if (x > 0 && x + wide > row_width) x = 0, y += row_height, row_height = 0;
     at.origin = {x + (wide - box.x()) / 2, y + 62 + box.y()};
     const double lines = 15.0 * static_cast<double>(at.panel->repairs.size());
@@ -505,25 +544,20 @@ Drawing draw(const Inspection& inspection) {
       {24, 50}, 11,
       fmt::format("{}{}{}", inspection.unit, inspection.exporter.empty() ? "" : ", written by ", inspection.exporter),
       "quiet", TextAnchor::start);
-  for (std::size_t k = 0; k < drawn.size(); ++k) {
-    const Drawn& at = drawn[k];
+  for (const Drawn& at : drawn) {
     const InspectedPanel& panel = *at.panel;
     const Vector2d box = scale * (at.high - at.low);
     const Vector2d above(at.origin.x() + box.x() / 2, at.origin.y() - box.y());
-    const double metre = panel.face.metres_per_unit;
-    svg.open_group(title_of(panel, k));
-    svg.text(above + Vector2d(0, -62), 14, title_of(panel, k), "bold");
-    svg.text(above + Vector2d(0, -46), 10,
-             fmt::format("{:.4g} m2, degree {} x {}, {} x {} control points{}", panel.measure.area * metre * metre,
-                         panel.face.surface.u().degree(), panel.face.surface.v().degree(), panel.face.surface.count_u(),
-                         panel.face.surface.count_v(), at.sheet.in_space ? "" : ", drawn in its parameters"),
-             "quiet");
+    svg.open_group(at.title);
+    svg.text(above + Vector2d(0, -62), 14, at.title, "bold");
+    svg.text(above + Vector2d(0, -46), 10, at.facts, "quiet");
     draw_cells(svg, at);
-    draw_addresses(svg, at);
-    draw_trims(svg, at);
+    TakenRoom room;
+    draw_addresses(svg, at, room);
+    draw_trims(svg, at, room);
     draw_points(svg, at);
     draw_marks(svg, at);
-    draw_grain(svg, at);
+    draw_grain(svg, at, room);
     draw_warnings(svg, at);
     double line = at.origin.y() + 66;
     int shown = 0;

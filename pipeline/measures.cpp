@@ -53,6 +53,17 @@ Extremes extremes(const std::vector<Eigen::Vector2d>& values, const std::vector<
   return e;
 }
 
+ShearExtremes shear_extremes(const std::vector<double>& values, const std::vector<GridSample>& samples) {
+  if (values.empty()) return {};
+  const auto [least, most] = std::ranges::minmax(values);
+  double area = 0, sum = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    area += samples[k].weight;
+    sum += samples[k].weight * std::abs(values[k]);
+  }
+  return {least, most, sum / area};
+}
+
 // What eq. 37 gives at the rows themselves.
 void measure_rows(const ConstraintRows& rows, const std::vector<ThreadStress>& stress, StateMeasures& m) {
   std::vector<double> nominal[2], second_pk[2], weights[2];
@@ -65,6 +76,17 @@ void measure_rows(const ConstraintRows& rows, const std::vector<ThreadStress>& s
   for (int c = 0; c < 2; ++c) {
     extremes(nominal[c], weights[c], c, m.raw_nominal);
     extremes(second_pk[c], weights[c], c, m.raw_second_pk);
+  }
+}
+
+// Strains that the limit holds, at its rows.
+void measure_limit(const ConstraintRows& rows, const Eigen::VectorXd& q, StateMeasures& m) {
+  for (const StrainRow& row : rows.strain) {
+    const double strain = 0.5 * (apply(row.row, q).squaredNorm() - 1);
+    const int c = row.warp ? 1 : 0;
+    m.at_constraints_max = std::max(m.at_constraints_max, std::abs(strain));
+    m.at_constraints.min[c] = std::min(m.at_constraints.min[c], strain);
+    m.at_constraints.max[c] = std::max(m.at_constraints.max[c], strain);
   }
 }
 
@@ -128,12 +150,32 @@ std::vector<GridSample> grid_samples(const Build& build, int n) {
   return samples;
 }
 
+std::vector<Eigen::Vector3d> output_points(const Build& build, const Eigen::VectorXd& q) {
+  std::vector<Eigen::Vector3d> points;
+  for (const OutputPoint& point : build.scene.points)
+    points.push_back(build.model->state(build.panel(point.panel), point.uv.x(), point.uv.y(), q).position);
+  return points;
+}
+
+std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& system, const DynamicState& state,
+                                           double dt) {
+  std::vector<Eigen::Vector3d> out(build.scene.pins.size(), Eigen::Vector3d::Zero());
+  if (!(dt > 0)) return out;
+  const Reactions r = reactions(system.dynamic, state, dt);
+  for (std::size_t k = 0; k < system.fixed_pin.size(); ++k)
+    out[static_cast<std::size_t>(system.fixed_pin[k])] += r.fixed.col(static_cast<Eigen::Index>(k));
+  for (std::size_t k = 0; k < system.place_pin.size(); ++k)
+    out[static_cast<std::size_t>(system.place_pin[k])] += r.place.col(static_cast<Eigen::Index>(k));
+  return out;
+}
+
 StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt) {
   StateMeasures m;
   const ShellModel& model = *build.model;
   const Eigen::VectorXd q = control_points(system, state);
   const std::vector<GridSample> samples = grid_samples(build);
   std::vector<Eigen::Vector2d> strain, nominal, second_pk;
+  std::vector<double> shear;
   std::optional<StressField> field;
   if (system.strain_rows > 0) {
     const ConstraintRows& rows = system.projection->rows();
@@ -152,6 +194,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   for (const GridSample& s : samples) {
     const ShellState at = model.state(s.panel, s.uv.x(), s.uv.y(), q);
     strain.emplace_back(at.strain.head<2>());
+    shear.push_back(at.strain[2]);
     if (field) {
       const auto [weft, warp] = field->at(s.panel, s.uv.x(), s.uv.y(), q);
       second_pk.emplace_back(weft.second_pk, warp.second_pk);
@@ -165,6 +208,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
     m.largest_deflection = std::max(m.largest_deflection, (at.position - start).norm());
   }
   m.strain = extremes(strain, samples);
+  m.shear = shear_extremes(shear, samples);
   m.nominal = extremes(nominal, samples);
   m.second_pk = extremes(second_pk, samples);
 
@@ -177,10 +221,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
       }
     }
   }
-  if (system.projection) {
-    for (const StrainRow& row : system.projection->rows().strain)
-      m.at_constraints_max = std::max(m.at_constraints_max, std::abs(0.5 * (apply(row.row, q).squaredNorm() - 1)));
-  }
+  if (system.projection) measure_limit(system.projection->rows(), q, m);
   for (const ShellPanel& panel : model.panels()) {
     for (std::size_t k = 0; k < panel.quadrature.points.size(); ++k) {
       const SurfaceJet jet = evaluate(panel.rest, panel.quadrature.points[k].x(), panel.quadrature.points[k].y());
@@ -189,19 +230,8 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
       m.mass += area * panel.fabric.density;
     }
   }
-  for (const OutputPoint& point : build.scene.points) {
-    m.points.push_back(model.state(build.panel(point.panel), point.uv.x(), point.uv.y(), q).position);
-  }
-  m.reactions.assign(build.scene.pins.size(), Eigen::Vector3d::Zero());
-  if (dt > 0) {
-    const Reactions r = reactions(system.dynamic, state, dt);
-    for (std::size_t k = 0; k < system.fixed_pin.size(); ++k) {
-      m.reactions[static_cast<std::size_t>(system.fixed_pin[k])] += r.fixed.col(static_cast<Eigen::Index>(k));
-    }
-    for (std::size_t k = 0; k < system.place_pin.size(); ++k) {
-      m.reactions[static_cast<std::size_t>(system.place_pin[k])] += r.place.col(static_cast<Eigen::Index>(k));
-    }
-  }
+  m.points = output_points(build, q);
+  m.reactions = pin_reactions(build, system, state, dt);
   return m;
 }
 

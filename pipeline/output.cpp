@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "analysis/projection/stress_recovery.h"
 #include "geometry/error.h"
+#include "geometry/measure.h"
 #include "io/file.h"
+#include "io/mesh_files.h"
+#include "io/net_files.h"
 #include "io/obj.h"
 #include "io/vtu.h"
 #include "pipeline/preview.h"
@@ -52,6 +56,21 @@ std::string base_name(const std::string& name) {
   return name;
 }
 
+// A move of the flat faces (the even ones) that sets them beside the draped ones on a level line, by a round length.
+Eigen::Vector3d beside_the_drape(const std::vector<OutputFace>& faces, const Eigen::Vector3d& up) {
+  Eigen::AlignedBox3d flat, draped;
+  for (std::size_t k = 0; k < faces.size(); ++k)
+    (k % 2 == 0 ? flat : draped).extend(bounding_box(faces[k].face.surface));
+  // Along x, or y where x is rather the height.
+  const Eigen::Index axis = std::abs(up.x()) < 0.8 ? 0 : 1;
+  const double size = flat.merged(draped).sizes().maxCoeff();
+  const double overlap = flat.max()[axis] - draped.min()[axis] + 0.1 * size;
+  const double step = std::pow(10.0, std::floor(std::log10(size))) / 10;
+  const double length = step * std::ceil(overlap / step);
+  if (!(size > 0) || !std::isfinite(length)) return Eigen::Vector3d::Zero();
+  return -length * Eigen::Vector3d::Unit(axis);
+}
+
 }  // namespace
 
 IgesOutput draped_file(const Build& build, const Eigen::VectorXd& q) {
@@ -74,15 +93,51 @@ IgesOutput draped_file(const Build& build, const Eigen::VectorXd& q) {
     const std::string name = base_name(panel.name);
     flat.name = name + std::string(flat_suffix);
     draped.name = name + std::string(draped_suffix);
-    faces.push_back({flat, flat.name, 1, std::array<double, 3>{0.6, 0.6, 0.6}});
-    faces.push_back({draped, draped.name, 2, std::array<double, 3>{0.2, 0.4, 0.8}});
+    faces.push_back({flat, flat.name, 1, std::array<double, 3>{0.6, 0.6, 0.6}, {}});
+    faces.push_back({draped, draped.name, 2, std::array<double, 3>{0.2, 0.4, 0.8}, {}});
   }
+  const Eigen::Vector3d aside = beside_the_drape(faces, up(build.scene));
+  for (std::size_t k = 0; k < faces.size(); k += 2) faces[k].aside = aside;
   IgesHeader header;
   header.product = build.scene.name;
   header.unit = unit.name;
   header.resolution = unit.resolution;
+  header.up = up(build.scene);
+  header.levels = {{1, "flat"}, {2, "draped"}};
   return format_iges(faces, header);
 }
+
+namespace {
+
+// Of all frames.
+constexpr const char* material_name = "cloth.mtl";
+
+struct FileFormat {
+  const char* ending;
+  FileSink::Format format;
+};
+FileFormat file_format(FrameFormat format) {
+  switch (format) {
+    case FrameFormat::obj:
+      return {".obj", [](const Frame& frame) { return format_obj(frame, material_name); }};
+    case FrameFormat::ply:
+      return {".ply", format_ply};
+    case FrameFormat::stl:
+      return {".stl", format_stl};
+    case FrameFormat::glb:
+      return {".glb", format_glb};
+    case FrameFormat::json:
+      return {".json", format_net_json};
+    case FrameFormat::csv:
+      return {".csv", format_net_csv};
+    case FrameFormat::iges:
+    case FrameFormat::vtu:
+      break;
+  }
+  throw std::logic_error("a frame format without files of its own");
+}
+
+}  // namespace
 
 struct FrameWriter::Impl {
   const Build& build;
@@ -90,6 +145,7 @@ struct FrameWriter::Impl {
   std::vector<TrimmedTriangles> triangles;  // made when they are first shown
   std::vector<std::unique_ptr<FrameSink>> sinks;
   bool iges = false;
+  std::string material;  // of OBJ frames; empty: none
 
   // Deformed panels with fields; surfaces and points are kept alive beside them.
   struct Shown {
@@ -143,6 +199,7 @@ struct FrameWriter::Impl {
       FramePanel panel;
       panel.name = built.name;
       panel.surface = &shown.surfaces.back();
+      panel.flat = &built.face.surface;
       panel.face = &built.face;
       panel.triangles = &triangles[k];
       for (const Eigen::Vector2d& uv : triangles[k].uv) {
@@ -173,19 +230,18 @@ struct FrameWriter::Impl {
 };
 
 FrameWriter::FrameWriter(const Build& build, std::filesystem::path directory, const std::vector<double>& written)
-    : impl_(new Impl{build, std::move(directory) / "frames", {}, {}, false}) {
+    : impl_(new Impl{build, std::move(directory) / "frames", {}, {}, false, {}}) {
+  const int next = static_cast<int>(written.size());
   for (const FrameFormat format : build.scene.formats) {
-    switch (format) {
-      case FrameFormat::vtu:
-        impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name, written));
-        break;
-      case FrameFormat::obj:
-        impl_->sinks.push_back(std::make_unique<ObjSink>(impl_->frames, static_cast<int>(written.size())));
-        break;
-      case FrameFormat::iges:
-        impl_->iges = true;
-        break;
+    if (format == FrameFormat::iges) {
+      impl_->iges = true;
+    } else if (format == FrameFormat::vtu) {
+      impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name, written));
+    } else {
+      const FileFormat file = file_format(format);
+      impl_->sinks.push_back(std::make_unique<FileSink>(impl_->frames, file.ending, file.format, next));
     }
+    if (format == FrameFormat::obj) impl_->material = material_name;
   }
 }
 
@@ -197,8 +253,10 @@ void FrameWriter::write(const RunFrame& frame) {
                Flush::no);
   }
   if (impl_->sinks.empty()) return;
+  if (!impl_->material.empty()) write_file(impl_->frames / impl_->material, format_mtl(), Flush::no);
   const Impl::Shown shown = impl_->show(frame.system, frame.q, &frame.velocity, frame.dt);
-  for (const auto& sink : impl_->sinks) sink->write({frame.number, frame.time, shown.panels});
+  const Frame picture{frame.number, frame.time, shown.panels, up(impl_->build.scene)};
+  for (const auto& sink : impl_->sinks) sink->write(picture);
 }
 
 std::string FrameWriter::preview(const System& system, const Eigen::VectorXd& q) const {
@@ -219,8 +277,8 @@ void prepare_directory(const std::filesystem::path& directory, bool overwrite) {
       throw OutputError(fmt::format("{} is not empty; give --overwrite to replace a former run, or another -o DIR",
                                     directory.string()));
     }
-    for (const char* name :
-         {"draped.igs", "report.json", "report.html", "preview.png", "run.log", "checkpoint", "frames"}) {
+    for (const char* name : {"draped.igs", "report.json", "report.html", "preview.png", "history.csv", "run.log",
+                             "checkpoint", "frames"}) {
       fs::remove_all(directory / name, error);
       if (error) throw OutputError(fmt::format("{}: {}", (directory / name).string(), error.message()));
     }

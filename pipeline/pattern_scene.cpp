@@ -1,19 +1,22 @@
 #include "pipeline/pattern_scene.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
+#include <tuple>
 
 #include "geometry/error.h"
 #include "io/panel_file.h"
 #include "io/triangle_mesh.h"
+#include "pipeline/body_fit.h"
 #include "pipeline/scene.h"
 #include "pipeline/templates.h"
 #include "pipeline/units.h"
+#include "pipeline/upright.h"
 
 namespace toile {
 namespace {
@@ -54,7 +57,9 @@ std::string vector(const Vector3d& x) {
   return fmt::format("[{}, {}, {}]", metres(x[0]), metres(x[1]), metres(x[2]));
 }
 
-Eigen::Isometry3d placed(const PatternPlace& place) {
+using Isometry = Eigen::Isometry3d;
+
+Isometry placed(const PatternPlace& place) {
   Placement p;
   p.rotate = place.rotate_deg * std::numbers::pi / 180;
   Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
@@ -99,7 +104,9 @@ bool stitched(const Pattern& pattern, const PatternEdge& edge) {
   const auto same = [&](const PatternEdge& e) {
     return e.panel == edge.panel && e.loop == edge.loop && e.curve == edge.curve;
   };
-  return std::ranges::any_of(pattern.stitches, [&](const Stitch& s) { return same(s.a) || same(s.b); });
+  return std::ranges::any_of(pattern.stitches, [&](const Stitch& s) {
+    return std::ranges::any_of(s.a, same) || std::ranges::any_of(s.b, same);
+  });
 }
 
 struct HungEdge {
@@ -133,80 +140,77 @@ std::vector<HungEdge> upper_edges(const Pattern& pattern, int panel, const Vecto
   return out;
 }
 
-// Length of the longest closed line in which the plane y = height cuts the mesh: the trunk's girth, arms left out.
-double girth(const TriangleMesh& mesh, double height) {
-  using Edge = std::pair<int, int>;
-  std::map<Edge, int> ids;
-  std::vector<int> parent;
-  std::vector<double> length;
-  std::vector<Vector3d> at;
-  const auto root = [&](int k) {
-    while (parent[static_cast<std::size_t>(k)] != k)
-      k = parent[static_cast<std::size_t>(k)] = parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(k)])];
-    return k;
-  };
-  const auto cut = [&](int a, int b) {
-    if (a > b) std::swap(a, b);
-    const auto [found, fresh] = ids.try_emplace({a, b}, static_cast<int>(at.size()));
-    if (fresh) {
-      const Vector3d p = mesh.vertices.col(a), q = mesh.vertices.col(b);
-      at.push_back(p + (height - p.y()) / (q.y() - p.y()) * (q - p));
-      parent.push_back(found->second);
-      length.push_back(0);
-    }
-    return found->second;
-  };
-  for (const std::array<int, 3>& t : mesh.triangles) {
-    std::vector<int> ends;
-    for (int k = 0; k < 3; ++k) {
-      const int a = t[static_cast<std::size_t>(k)], b = t[static_cast<std::size_t>((k + 1) % 3)];
-      if ((mesh.vertices(1, a) < height) != (mesh.vertices(1, b) < height)) ends.push_back(cut(a, b));
-    }
-    if (ends.size() != 2) continue;
-    const double piece = (at[static_cast<std::size_t>(ends[0])] - at[static_cast<std::size_t>(ends[1])]).norm();
-    const int a = root(ends[0]), b = root(ends[1]);
-    length[static_cast<std::size_t>(a)] += piece + (a == b ? 0 : length[static_cast<std::size_t>(b)]);
-    parent[static_cast<std::size_t>(b)] = a;
-  }
-  return length.empty() ? 0 : *std::ranges::max_element(length);
-}
-
-Vector3d centre_of_mass(const TriangleMesh& mesh) {
-  double volume = 0;
-  Vector3d sum(0, 0, 0);
-  for (const std::array<int, 3>& t : mesh.triangles) {
-    const Vector3d a = mesh.vertices.col(t[0]), b = mesh.vertices.col(t[1]), c = mesh.vertices.col(t[2]);
-    const double v = a.dot(b.cross(c)) / 6;
-    volume += v;
-    sum += v * (a + b + c) / 4;
-  }
-  const Vector3d middle = (mesh.vertices.rowwise().minCoeff() + mesh.vertices.rowwise().maxCoeff()) / 2;
-  return volume > 0 ? Vector3d(sum / volume) : middle;
-}
-
 std::string address(const PatternEdge& edge) {
   return fmt::format("curve:{},{}", edge.loop, edge.curve);
 }
 
-}  // namespace
-
-SeamDirection seam_direction(const Pattern& pattern, const Stitch& stitch) {
-  const PlacedEdge a = placed_edge(pattern, stitch.a), b = placed_edge(pattern, stitch.b);
-  const double along = (a.start - b.start).norm() + (a.end - b.end).norm();
-  const double against = (a.start - b.end).norm() + (a.end - b.start).norm();
-  // Either way nearly as far: the placement doesn't tell, say so.
-  return {against < along, std::abs(along - against) <= 0.05 * std::min(a.length, b.length)};
+double length(const Pattern& pattern, const std::vector<PatternEdge>& side) {
+  double sum = 0;
+  for (const PatternEdge& edge : side) sum += placed_edge(pattern, edge).length;
+  return sum;
 }
 
-PatternScene pattern_scene(const std::filesystem::path& path, const std::optional<std::filesystem::path>& body,
-                           const std::filesystem::path& scene) {
-  Pattern pattern;
-  if (is_pattern(path)) {
-    pattern = read_pattern(path);
-  } else {
-    pattern.file = read_panels(path);
-    pattern.places.resize(pattern.file.panels.size());
+std::string panel_key(const Pattern& pattern, const PatternEdge& edge) {
+  return fmt::format("panel = {}, loop = {}", quoted(pattern.file.panels[static_cast<std::size_t>(edge.panel)].name),
+                     edge.loop);
+}
+
+// Edges that one key can name: `curves = [...]` runs along curves of one loop.
+bool one_side(const std::vector<PatternEdge>& side) {
+  return std::ranges::all_of(side,
+                             [&](const PatternEdge& e) { return e.panel == side[0].panel && e.loop == side[0].loop; });
+}
+
+std::string side_text(const Pattern& pattern, const std::vector<PatternEdge>& side) {
+  std::vector<int> curves;
+  for (const PatternEdge& edge : side) curves.push_back(edge.curve);
+  if (curves.size() == 1) return fmt::format("{}, curve = {}", panel_key(pattern, side[0]), curves[0]);
+  return fmt::format("{}, curves = [{}]", panel_key(pattern, side[0]), fmt::join(curves, ", "));
+}
+
+std::string seam_table(const std::string& a, const std::string& b, bool reverse, double length_a, double length_b) {
+  return fmt::format("\n[[seam]]     # {:.3f} m to {:.3f} m\na = {{ {} }}\nb = {{ {}{} }}\n", length_a, length_b, a, b,
+                     reverse ? ", reverse = true" : "");
+}
+
+// One table a stitch; where the edges of a side lie on several panels, one for each of them with its share of the
+// other.
+std::string seam_tables(const Pattern& pattern, const Stitch& stitch) {
+  const double length_a = length(pattern, stitch.a), length_b = length(pattern, stitch.b);
+  if (one_side(stitch.a) && one_side(stitch.b)) {
+    return seam_table(side_text(pattern, stitch.a), side_text(pattern, stitch.b), stitch.reverse, length_a, length_b);
   }
+  const bool one_is_a = one_side(stitch.a);
+  const std::vector<PatternEdge>&one = one_is_a ? stitch.a : stitch.b, &many = one_is_a ? stitch.b : stitch.a;
+  if (!one_side(one)) {
+    throw InputError(fmt::format("{}:{}: a stitch of several edges of several panels on both sides; write one a pair",
+                                 pattern.file.path, stitch.line));
+  }
+  const double whole = length(pattern, many), other = length(pattern, one);
+  std::string text;
+  double before = 0;
+  for (const PatternEdge& edge : many) {
+    const double here = length(pattern, {edge});
+    // The share from the start of `one` in its own direction.
+    double from = before / whole, to = (before + here) / whole;
+    if (stitch.reverse) std::tie(from, to) = std::pair(1 - to, 1 - from);
+    const std::string share = fmt::format("{}, from = {:.9g}, to = {:.9g}", side_text(pattern, one), from, to);
+    text += seam_table(share, side_text(pattern, {edge}), stitch.reverse, other * (to - from), here);
+    before += here;
+  }
+  return text;
+}
+
+Pattern read_any(const std::filesystem::path& path, const PanelChoice& choice) {
+  Pattern pattern;
+  if (is_pattern(path) && choice == PanelChoice()) return read_pattern(path);
+  pattern.file = read_panels(path, choice);
+  leave_out_invalid(pattern.file);
+  pattern.places.resize(pattern.file.panels.size());
+  return pattern;
+}
+
+void refuse_unnamed(const Pattern& pattern, const std::filesystem::path& path) {
   const std::vector<TrimmedSurface>& panels = pattern.file.panels;
   if (panels.empty()) throw InputError(fmt::format("{}: holds no panel", path.string()));
   for (std::size_t k = 0; k < panels.size(); ++k) {
@@ -214,123 +218,231 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
       if (panels[m].name == panels[k].name)
         throw InputError(fmt::format("{}: two panels are called '{}'", path.string(), panels[k].name));
   }
-  PatternScene out;
-  out.warnings = pattern.file.warnings;
-  std::optional<TriangleMesh> mesh;
-  std::string moved;
-  if (body) {
-    mesh = read_mesh(*body);
-    const double soles = mesh->vertices.row(1).minCoeff(), height = mesh->vertices.row(1).maxCoeff() - soles;
-    if (!(height > 0.3 && height < 3)) {
-      out.warnings.push_back(
-          fmt::format("{}: the body is {:.3g} high in y; a body in metres is expected: set unit in "
-                      "[[obstacle]] and move the panels",
-                      body->string(), height));
-    }
-    Vector3d shift(0, soles, 0);
-    if (!pattern.soles_at_zero) {
-      const Vector3d mass = centre_of_mass(*mesh);
-      shift = {mass.x(), soles + origin_height * height, mass.z()};
-    }
-    for (PatternPlace& place : pattern.places) place.translate += shift;
-    moved =
-        fmt::format("# Moved by {} m to the body: {}\n", vector(shift),
-                    pattern.soles_at_zero ? "the pattern's soles are at y = 0."
-                                          : "the pattern's origin is the centre of mass of the body it was drawn on.");
-  }
-  const Vector3d up = Vector3d::UnitY();
-  const bool json = is_pattern(path);
+}
 
-  std::string& text = out.text;
-  text = fmt::format(
+// Moves the panels to the body; a comment that says how.
+std::string place_at(const TriangleMesh& mesh, const std::filesystem::path& body, bool drawing, Pattern& pattern,
+                     PatternScene& out) {
+  const Vector3d low = mesh.vertices.rowwise().minCoeff(), high = mesh.vertices.rowwise().maxCoeff();
+  const double soles = low.y(), height = high.y() - soles;
+  if (!(height > 0.3 && height < 3)) {
+    out.warnings.push_back(
+        fmt::format("{}: the body is {:.3g} high in y; a body in metres is expected: set unit in "
+                    "[[obstacle]] and move the panels",
+                    body.string(), height));
+  }
+  Vector3d shift(0, soles, 0);
+  std::string why = "the pattern's soles are at y = 0.";
+  if (drawing) {
+    constexpr double shoulders = 0.82;  // of a body's height
+    shift = {low.x(), soles + shoulders * height, high.z() + 0.05};
+    why = "they hang before it, side by side.";
+  } else if (!pattern.soles_at_zero) {
+    const Vector3d mass = centre_of_mass(mesh);
+    shift = {mass.x(), soles + origin_height * height, mass.z()};
+    why = "the pattern's origin is the centre of mass of the body it was drawn on.";
+  }
+  for (PatternPlace& place : pattern.places) place.translate += shift;
+  return fmt::format("# Moved by {} m to the body: {}\n", vector(shift), why);
+}
+
+// A line of places along a border of the glued garment.
+std::vector<Vector3d> places_along(const Pattern& pattern, const std::vector<GluePart>& line) {
+  constexpr int pieces = 16;
+  std::vector<Vector3d> out;
+  for (const GluePart& part : line) {
+    const TrimmedSurface& face = pattern.file.panels[static_cast<std::size_t>(part.panel)];
+    const Isometry place = placed(pattern.places[static_cast<std::size_t>(part.panel)]);
+    const Curve2& curve =
+        face.loops[static_cast<std::size_t>(part.loop)].curves[static_cast<std::size_t>(part.edge)].curve;
+    for (int k = 0; k <= pieces; ++k) {
+      const double t = part.from + (part.to - part.from) * k / pieces;
+      const Eigen::Vector2d p = curve(curve.domain().min + t * curve.domain().length());
+      out.push_back(place * Vector3d(face.metres_per_unit * face.surface(p.x(), p.y())));
+    }
+  }
+  return out;
+}
+
+// The highest opening that runs around the trunk, against the body there; empty where none does.
+std::string waist_advice(const Pattern& pattern, const TriangleMesh& mesh) {
+  std::string advice;
+  double best = -1e300;
+  for (const GluedPiece& piece : pattern.gluing.pieces) {
+    for (const std::vector<GluePart>& line : piece.border_lines) {
+      const std::vector<Vector3d> places = places_along(pattern, line);
+      double height = 0;
+      std::vector<Eigen::Vector2d> around;
+      for (const Vector3d& x : places) {
+        height += x.y() / static_cast<double>(places.size());
+        around.emplace_back(x.x(), x.z());
+      }
+      const TrunkSection trunk = trunk_section(mesh, height);
+      if (height <= best || trunk.girth == 0 || std::abs(std::abs(turns_around(around, trunk.centre)) - 1) > 0.1)
+        continue;
+      best = height;
+      double length = 0;
+      for (const GluePart& part : line) {
+        const TrimLoop& loop =
+            pattern.file.panels[static_cast<std::size_t>(part.panel)].loops[static_cast<std::size_t>(part.loop)];
+        length += placed_edge(pattern, {part.panel, part.loop, loop.curves[static_cast<std::size_t>(part.edge)].index})
+                      .length *
+                  std::abs(part.to - part.from);
+      }
+      advice =
+          fmt::format("the upper opening is {:.3f} m around at y = {:.3f}; the body measures {:.3f} m there{}", length,
+                      height, trunk.girth, length < trunk.girth ? ": it must stretch or sit elsewhere" : "");
+    }
+  }
+  return advice;
+}
+
+// Places spread over a panel's material, by its outline's even-odd rule: good for a share in per cent.
+std::vector<Vector3d> places_on(const Pattern& pattern, std::size_t k) {
+  constexpr int grid = 20, pieces = 24;
+  const TrimmedSurface& face = pattern.file.panels[k];
+  const Isometry place = placed(pattern.places[k]);
+  std::vector<std::vector<Eigen::Vector2d>> loops;
+  for (const TrimLoop& loop : face.loops) {
+    loops.emplace_back();
+    for (const TrimCurve& trim : loop.curves)
+      for (int n = 0; n < pieces; ++n) {
+        const double t = static_cast<double>(trim.reversed ? pieces - n : n) / pieces;
+        loops.back().push_back(trim.curve(trim.curve.domain().min + t * trim.curve.domain().length()));
+      }
+  }
+  const Interval u = face.surface.u().domain(), v = face.surface.v().domain();
+  std::vector<Vector3d> out;
+  for (int i = 0; i < grid; ++i) {
+    for (int j = 0; j < grid; ++j) {
+      const Eigen::Vector2d p(u.min + u.length() * (i + 0.5) / grid, v.min + v.length() * (j + 0.5) / grid);
+      double turns = 0;
+      for (const auto& loop : loops) turns += std::abs(turns_around(loop, p));
+      if (std::lround(turns) % 2 == 1)
+        out.push_back(place * Vector3d(face.metres_per_unit * face.surface(p.x(), p.y())));
+    }
+  }
+  return out;
+}
+
+// How much of the panels starts inside the body, which contact would have to push out.
+void say_overlap(const Pattern& pattern, const TriangleMesh& mesh, PatternScene& out) {
+  std::size_t all = 0;
+  int inside = 0;
+  std::string worst;
+  double largest = 0;
+  for (std::size_t k = 0; k < pattern.file.panels.size(); ++k) {
+    const std::vector<Vector3d> places = places_on(pattern, k);
+    const int in = count_inside(mesh, places);
+    all += places.size();
+    inside += in;
+    const double share = places.empty() ? 0 : static_cast<double>(in) / static_cast<double>(places.size());
+    if (share > largest) largest = share, worst = pattern.file.panels[k].name;
+  }
+  if (all == 0) return;
+  std::string text =
+      fmt::format("{:.1f} % of the panels lies inside the body", 100.0 * inside / static_cast<double>(all));
+  if (inside > 0) text += fmt::format(", of '{}' {:.1f} %", worst, 100 * largest);
+  out.text += "# " + text + ".\n";
+  out.notes.push_back(text);
+}
+
+std::string head_text(const std::filesystem::path& path, const std::filesystem::path& scene, const PatternScene& out) {
+  std::string text = fmt::format(
       "# {} as a scene: toile init --pattern. Lengths in metres, or with units: \"20 mm\"; y points up.\n"
       "# toile inspect {} --svg panels.svg     shows the loop and curve numbers used below\n",
       path.filename().string(), path_from(scene, path));
-  if (!pattern.stitches.empty() || body) {
-    text +=
-        "# Seams and obstacles are checked but not simulated by this version. Each panel drapes alone:\n"
-        "#   toile drape scene.toml --set 'seam=[]' --set 'obstacle=[]'\n";
+  if (!out.without.empty()) {
+    text += fmt::format(
+        "# Seams and obstacles are not simulated by this version. Each panel drapes alone:\n"
+        "#   toile drape scene.toml{}\n",
+        out.without);
   }
-  text += moved;
-  for (std::size_t k = 0; k < panels.size(); ++k) {
-    text += fmt::format("\n[[panel]]\nname = {}\n{} = {}\nrefine = {{ degree = 2, span = \"20 mm\" }}\n",
-                        quoted(panels[k].name), json ? "pattern" : "file", quoted(path_from(scene, path)));
-    if (const auto grain = grain_angle(panels[k])) {
-      text += fmt::format("# grain_deg = {}     is what the panel's grain line says\n", degrees_text(*grain));
-    }
-    const PatternPlace& place = pattern.places[k];
-    text += fmt::format("place = {{ translate = {}, rotate_deg = [{}, {}, {}] }}\nfabric = \"cotton\"\n",
-                        vector(place.translate), place.rotate_deg[0] + 0.0, place.rotate_deg[1] + 0.0,
-                        place.rotate_deg[2] + 0.0);
-  }
-  text += '\n';
-  text += fabric_tables();
+  return text;
+}
 
-  text += "\n# Each panel hangs from its upper edges. Seams and a waistband take their place when panels are sewn.\n";
-  double free_length = 0, free_height = 0;
-  for (int k = 0; k < static_cast<int>(panels.size()); ++k) {
+std::string panel_text(const Pattern& pattern, std::size_t k, const std::string& file, const PanelChoice& choice) {
+  const TrimmedSurface& panel = pattern.file.panels[k];
+  std::string text = fmt::format("\n[[panel]]\nname = {}\n{} = {}\n", quoted(panel.name),
+                                 is_pattern(file) ? "pattern" : "file", quoted(file));
+  if (!choice.size.empty()) text += fmt::format("size = {}\n", quoted(choice.size));
+  if (!choice.unit.empty()) text += fmt::format("unit = {}\n", quoted(choice.unit));
+  if (!choice.outline.empty()) text += fmt::format("outline = {}\n", quoted(choice.outline));
+  text += "refine = { degree = 2, span = \"20 mm\" }\n";
+  if (const auto grain = grain_angle(panel)) {
+    text += fmt::format("# grain_deg = {}     is what the panel's grain line says\n", degrees_text(*grain));
+  }
+  const PatternPlace& place = pattern.places[k];
+  return text + fmt::format("place = {{ translate = {}, rotate_deg = [{}, {}, {}] }}\nfabric = \"cotton\"\n",
+                            vector(place.translate), place.rotate_deg[0] + 0.0, place.rotate_deg[1] + 0.0,
+                            place.rotate_deg[2] + 0.0);
+}
+
+std::string pins_text(const Pattern& pattern) {
+  std::string text = "\n# Each panel hangs from its upper edges.\n";
+  const Vector3d up = Vector3d::UnitY();
+  for (int k = 0; k < static_cast<int>(pattern.file.panels.size()); ++k) {
     for (const HungEdge& h : upper_edges(pattern, k, up)) {
       text += fmt::format("[[pin]]\npanel = {}\nat = \"{}\"     # {:.3f} m at y = {:.3f}{}\n",
-                          quoted(panels[static_cast<std::size_t>(k)].name), address(h.edge), h.placed.length,
-                          up.dot(h.placed.middle), h.free ? "" : ", sewn");
+                          quoted(pattern.file.panels[static_cast<std::size_t>(k)].name), address(h.edge),
+                          h.placed.length, up.dot(h.placed.middle), h.free ? "" : ", sewn");
     }
   }
-  // The waistband: free edges in the upper tenth of the whole garment's height.
-  double low = 1e300, high = -1e300;
-  std::vector<HungEdge> edges;
-  for (int k = 0; k < static_cast<int>(panels.size()); ++k) {
-    for (const TrimCurve& trim : panels[static_cast<std::size_t>(k)].loops[0].curves) {
-      HungEdge h{{k, 0, trim.index}, {}, false};
-      h.placed = placed_edge(pattern, h.edge);
-      h.free = !stitched(pattern, h.edge);
-      low = std::min(low, up.dot(h.placed.middle));
-      high = std::max(high, up.dot(h.placed.middle));
-      edges.push_back(h);
-    }
-  }
-  for (const HungEdge& h : edges) {
-    const double rise = std::abs(up.dot(h.placed.end - h.placed.start));
-    if (!h.free || rise > 0.7 * h.placed.length || up.dot(h.placed.middle) < high - 0.1 * (high - low)) continue;
-    free_length += h.placed.length;
-    free_height += h.placed.length * up.dot(h.placed.middle);
-  }
-  if (free_length > 0 && !pattern.stitches.empty()) {
-    free_height /= free_length;
-    std::string advice = fmt::format("the free upper edge is {:.3f} m long at y = {:.3f}", free_length, free_height);
-    if (mesh) {
-      const double around = girth(*mesh, free_height);
-      advice += fmt::format("; the body measures {:.3f} m there", around);
-      if (free_length < around) advice += ": it must stretch or sit elsewhere";
-    }
-    text += "# Waistband: " + advice + ".\n";
-    out.notes.push_back(advice);
-  }
+  return text;
+}
 
-  for (const Stitch& stitch : pattern.stitches) {
-    const SeamDirection direction = seam_direction(pattern, stitch);
-    const double a = placed_edge(pattern, stitch.a).length, b = placed_edge(pattern, stitch.b).length;
-    const std::string &name_a = panels[static_cast<std::size_t>(stitch.a.panel)].name,
-                      &name_b = panels[static_cast<std::size_t>(stitch.b.panel)].name;
-    text += fmt::format("\n[[seam]]     # {:.3f} m to {:.3f} m{}\n", a, b,
-                        direction.doubt ? "; the placement doesn't tell the direction: look at reverse" : "");
-    text += fmt::format("a = {{ panel = {}, loop = {}, curve = {} }}\n", quoted(name_a), stitch.a.loop, stitch.a.curve);
-    text += fmt::format("b = {{ panel = {}, loop = {}, curve = {}{} }}\n", quoted(name_b), stitch.b.loop,
-                        stitch.b.curve, direction.reverse ? ", reverse = true" : "");
-    if (direction.doubt) {
-      out.warnings.push_back(
-          fmt::format("{}:{}: the placement doesn't tell in which direction '{}' {} and '{}' {} are "
-                      "sewn; look at reverse in the scene",
-                      path.string(), stitch.line, name_a, address(stitch.a), name_b, address(stitch.b)));
+}  // namespace
+
+PatternScene pattern_scene(const std::filesystem::path& path, const std::optional<std::filesystem::path>& body,
+                           const std::filesystem::path& scene, const PanelChoice& choice) {
+  Pattern pattern = read_any(path, choice);
+  refuse_unnamed(pattern, path);
+  PatternScene out;
+  out.warnings = pattern.file.warnings;
+  out.details = pattern.file.notes;
+  out.refused = pattern.file.refused;
+  if (!pattern.stitches.empty()) out.without += " --set 'seam=[]'";
+  if (body) out.without += " --set 'obstacle=[]'";
+  std::string& text = out.text;
+  text = head_text(path, scene, out);
+  bool drawing = false;
+  if (!is_pattern(path)) {
+    if (auto places = hang_upright(pattern.file.panels)) {
+      drawing = true;
+      pattern.places = std::move(*places);
+      text += "# The panels hang upright by their grain, side by side where they would overlap.\n";
     }
   }
+  std::optional<TriangleMesh> mesh;
+  if (body) {
+    mesh = read_mesh(*body);
+    text += place_at(*mesh, *body, drawing, pattern, out);
+  }
+  PanelChoice written = choice;
+  if (written.size.empty() && pattern.file.sizes.size() > 1) written.size = pattern.file.size;
+  for (std::size_t k = 0; k < pattern.file.panels.size(); ++k)
+    text += panel_text(pattern, k, path_from(scene, path), written);
+  text += '\n' + fabric_tables() + pins_text(pattern);
+  if (mesh) {
+    say_overlap(pattern, *mesh, out);
+    if (const std::string advice = waist_advice(pattern, *mesh); !advice.empty()) {
+      text += "# " + advice + ".\n";
+      out.notes.push_back(advice);
+    }
+  }
+  for (const Stitch& stitch : pattern.stitches) text += seam_tables(pattern, stitch);
   if (body) {
     text += fmt::format("\n[[obstacle]]\nmesh = {}\nunit = \"m\"\nfriction = 0.3\n", quoted(path_from(scene, *body)));
   }
   text +=
       "\n[load]\ngravity = [0, -9.81, 0]\n\n[solver]\nuntil = \"0.8 s\"\n\n[output]\nevery = \"1/30 s\"\n"
-      "formats = [\"vtu\"]     # also \"iges\", \"obj\"\n";
-  out.notes.push_back(
-      fmt::format("{} panels, {} seams{}", panels.size(), pattern.stitches.size(), body ? ", a body" : ""));
+      "formats = [\"vtu\"]     # also \"iges\", \"obj\", \"glb\", ...\n";
+  out.notes.push_back(fmt::format("{} panels, {} seams{}", pattern.file.panels.size(), pattern.stitches.size(),
+                                  body ? ", a body" : ""));
+  if (pattern.file.sizes.size() > 1) {
+    out.notes.push_back(fmt::format("sizes {}; read is {}: --size chooses", fmt::join(pattern.file.sizes, ", "),
+                                    written.size.empty() ? "one for each piece" : written.size));
+  }
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/panel_file.h"
 #include "io/pattern_json.h"
 
 namespace toile {
@@ -14,20 +15,16 @@ struct PatternScene {
   std::string text;                   // scene.toml
   std::vector<std::string> notes;     // what was decided, for the console
   std::vector<std::string> warnings;  // what the user should look at
+  std::vector<std::string> details;   // decisions that say nothing against the pattern
+  std::vector<std::string> refused;   // panels of the pattern that the scene does without, and why
+  std::string without;                // options that leave out what this version doesn't simulate
 };
 
 // Complete and valid: panels in their places, each hung by its highest edges; a seam for every stitch, its direction
-// the one that brings the placed ends together; the body as obstacle, the pattern moved to it; how the free upper edges
+// as the pattern states it; the body as obstacle, the pattern moved to it; how the free upper edges
 // compare with the body's girth there. Names of files are written relative to the scene where they lie below it.
 // `pattern` is any panel file: without placements and stitches the panels keep their places in it.
 PatternScene pattern_scene(const std::filesystem::path& pattern, const std::optional<std::filesystem::path>& body,
-                           const std::filesystem::path& scene);
-
-// Should side b run against its curve, so that the ends of the two placed curves meet? `doubt` where both ways are
-// nearly as good.
-struct SeamDirection {
-  bool reverse = false, doubt = false;
-};
-SeamDirection seam_direction(const Pattern& pattern, const Stitch& stitch);
+                           const std::filesystem::path& scene, const PanelChoice& choice = {});
 
 }  // namespace toile

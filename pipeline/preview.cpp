@@ -5,18 +5,20 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <numbers>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "geometry/error.h"
-#include "pipeline/colour.h"
+#include "pipeline/colour_scale.h"
 #include "pipeline/image.h"
 
 namespace toile {
@@ -29,18 +31,36 @@ using Eigen::Vector3f;
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// Work on items 0..count-1, each on its own, so that the number of threads can't show in the result.
+// Work on items 0..count-1, each on its own, so that the number of threads can't show in the result. Where items throw,
+// the others are still done, and the exception of the lowest one comes out.
 void for_all(int count, const std::function<void(int)>& work) {
   const int threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 16);
   std::atomic<int> next{0};
+  std::mutex mutex;  // of the two below
+  int failed = count;
+  std::exception_ptr error;
+  const auto attempt = [&](int k) {
+    try {
+      work(k);
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      if (k < failed) failed = k, error = std::current_exception();
+    }
+  };
   const auto run = [&] {
     constexpr int chunk = 8;
     for (int first = next.fetch_add(chunk); first < count; first = next.fetch_add(chunk))
-      for (int k = first; k < std::min(first + chunk, count); ++k) work(k);
+      for (int k = first; k < std::min(first + chunk, count); ++k) attempt(k);
   };
-  std::vector<std::jthread> helpers;
-  for (int k = 1; k < threads; ++k) helpers.emplace_back(run);
-  run();
+  {
+    std::vector<std::jthread> helpers;
+    try {
+      for (int k = 1; k < threads; ++k) helpers.emplace_back(run);
+    } catch (const std::system_error&) {  // fewer threads then
+    }
+    run();
+  }
+  if (error) std::rethrow_exception(error);
 }
 
 // ---- the cloth -----------------------------------------------------------------------------------------------------
@@ -360,64 +380,6 @@ Camera fit_camera(const Cloth& cloth, const Vector3f& back, const Vector3f& up, 
 
 const Vector3f ink(0.045f, 0.055f, 0.075f);
 
-// With as many decimals as a hundredth of the scale's range needs.
-std::string percent(float strain, float range) {
-  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(100 * range))), 0, 7);
-  std::array<char, 64> text;
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), 100 * strain, std::chars_format::fixed, decimals);
-  std::string out(text.data(), end.ptr);
-  if (out.starts_with('-') && out.find_first_not_of("-0.") == std::string::npos) out.erase(0, 1);
-  return out + " %";
-}
-
-struct Scale {
-  float low = 0, high = 1;
-  double position(float value) const { return (value - low) / (high - low); }
-};
-
-// The range that the eye meets: all but the last half percent of the visible cloth at each end, which would be a point
-// at a pin. Both ends thus occur in the picture.
-Scale visible_range(std::vector<float> values) {
-  const auto end = static_cast<std::ptrdiff_t>(values.size());
-  const std::ptrdiff_t skip = end / 200;
-  std::nth_element(values.begin(), values.begin() + skip, values.end());
-  const float low = values[static_cast<std::size_t>(skip)];
-  std::nth_element(values.begin(), values.begin() + (end - 1 - skip), values.end());
-  const float high = values[static_cast<std::size_t>(end - 1 - skip)];
-  constexpr float noise = 1e-7f;  // strain that single precision can't tell from none
-  return high - low > noise ? Scale{low, high} : Scale{low - noise, low + noise};
-}
-
-void draw_scale(Image& image, const Scale& scale, float unit) {
-  const int left = static_cast<int>(static_cast<float>(image.width) - 112 * unit);
-  const int right = left + static_cast<int>(15 * unit);
-  const int top = static_cast<int>(0.25f * static_cast<float>(image.height));
-  const int bottom = static_cast<int>(0.75f * static_cast<float>(image.height));
-  for (int y = top - 1; y <= bottom; ++y)
-    for (int x = left - 1; x <= right; ++x) {
-      const bool edge = y < top || y >= bottom || x < left || x >= right;
-      // The end colours fill the rows at the ends exactly.
-      const double s = static_cast<double>(bottom - 1 - y) / (bottom - 1 - top);
-      image.blend(x, y, edge ? ink : strain_colour(s), edge ? 0.6f : 1.0f);
-    }
-  const float text_left = static_cast<float>(right) + 9 * unit;
-  for (const float s : {0.0f, 0.25f, 0.5f, 0.75f, 1.0f}) {
-    const float y = static_cast<float>(bottom) - s * static_cast<float>(bottom - top);
-    for (int x = right; x < right + static_cast<int>(5 * unit); ++x)
-      image.blend(x, std::clamp(static_cast<int>(y), top, bottom - 1), ink, 0.6f);
-    draw_text(image, text_left, y + 4.5f * unit, 9.5f * unit,
-              percent(scale.low + s * (scale.high - scale.low), scale.high - scale.low), ink);
-  }
-  const auto centred = [&](const char* text, float y, float size) {
-    const float middle = static_cast<float>(left + right) / 2 + 14 * unit;
-    draw_text(image, middle - text_width(text, size) / 2, y, size, text, ink);
-  };
-  centred("strain", static_cast<float>(top) - 18 * unit, 12 * unit);
-  centred("larger of weft", static_cast<float>(bottom) + 26 * unit, 8 * unit);
-  centred("and warp", static_cast<float>(bottom) + 41 * unit, 8 * unit);
-}
-
 // Light on a plane under the cloth, on a grid about the origin.
 class Ground {
  public:
@@ -483,7 +445,7 @@ struct Shader {
   const Cloth& cloth;
   const std::vector<std::array<Light, 2>>& light;
   const Camera& camera;
-  Scale scale;
+  ColourScale scale;
   Vector3f key, up;
 
   Vector3f operator()(const Hit& hit, const Vector3f& direction) const {
@@ -509,7 +471,7 @@ struct Shader {
     const float hemisphere = 0.5f + 0.5f * normal.dot(up);
     const float shade =
         seen.sky * (0.36f + 0.16f * hemisphere) + 0.50f * seen.key * std::max(0.0f, normal.dot(key)) + 0.12f * facing;
-    Vector3f colour = cloth.valued ? strain_colour(scale.position(value)) : Vector3f(0.62f, 0.64f, 0.68f);
+    Vector3f colour = cloth.valued ? scale.colour(value) : Vector3f(0.62f, 0.64f, 0.68f);
     colour = (back ? 0.92f : 1.0f) * shade * colour;
     colour +=
         Vector3f::Constant(0.05f * std::pow(1 - facing, 3.0f) * seen.sky);  // the sheen of cloth seen at a low angle
@@ -563,10 +525,8 @@ std::string preview_png(const Frame& frame, const PreviewOptions& options) {
   const Lighting ground_lighting(cloth, rays, key, 48, 24);
   const Ground ground(cloth, ground_lighting, up);
 
-  Scale scale;
-  if (options.range && options.range->length() > 0) {
-    scale = {static_cast<float>(options.range->min), static_cast<float>(options.range->max)};
-  } else if (cloth.valued) {
+  ColourScale scale;
+  if (cloth.valued) {
     std::vector<std::vector<float>> rows(static_cast<std::size_t>(options.height));
     for_all(options.height, [&](int y) {
       for (int x = 0; x < options.width; ++x) {
@@ -581,7 +541,10 @@ std::string preview_png(const Frame& frame, const PreviewOptions& options) {
     });
     std::vector<float> values;
     for (const auto& row : rows) values.insert(values.end(), row.begin(), row.end());
-    scale = visible_range(values.empty() ? cloth.value : std::move(values));
+    scale = scale_of(values.empty() ? cloth.value : std::move(values), options.range);
+    // What the bar says of extremes is true of all the cloth, seen or not.
+    const auto [least, most] = std::ranges::minmax_element(cloth.value);
+    scale.least = *least, scale.most = *most;
   }
 
   const Shader shader{cloth, light, camera, scale, key, up};
@@ -605,7 +568,7 @@ std::string preview_png(const Frame& frame, const PreviewOptions& options) {
     }
   });
 
-  if (cloth.valued) draw_scale(image, scale, unit);
+  if (cloth.valued) draw_strain_bar(image, scale, unit);
   if (!options.title.empty()) draw_text(image, 24 * unit, height - 22 * unit, 10 * unit, options.title, 3 * ink);
   return png(image);
 }

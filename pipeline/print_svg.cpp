@@ -6,8 +6,8 @@
 
 #include "geometry/error.h"
 #include "io/iges/model_curve.h"
+#include "io/pattern_sheet.h"
 #include "pipeline/convert.h"
-#include "pipeline/drawing_plane.h"
 #include "pipeline/svg.h"
 
 namespace toile {
@@ -148,12 +148,14 @@ void draw_marks(Paper& paper, const Sheet& sheet) {
         if (mark.curve) paper.arrow(sheet(mark.curve->start()), sheet(mark.curve->end()));
         break;
       case MarkKind::line:
+      case MarkKind::sew:
+      case MarkKind::slit:
       case MarkKind::notch: {
         if (mark.curve) {
           const Curve2 curve = sheet(*mark.curve);
           std::string path = std::string("M") + point(curve.start());
           append_curve(path, curve);
-          paper.path(path, mark.kind == MarkKind::line ? "inner" : "mark");
+          paper.path(path, mark.kind == MarkKind::notch ? "mark" : "inner");
         } else {
           paper.path(line_path(at - Vector2d(2.5, 0), at + Vector2d(2.5, 0)), "mark");
         }

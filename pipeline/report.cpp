@@ -62,6 +62,20 @@ Json measures_json(const System& system, const RunResult& run, const StateMeasur
 
 }  // namespace
 
+std::vector<std::pair<const char*, double>> energy_entries(const EnergyBalance& e) {
+  return {{"kinetic", e.kinetic},
+          {"membrane", e.membrane},
+          {"bending", e.bending},
+          {"limit", e.limit},
+          {"gravity", e.gravity},
+          {"dissipated", e.dissipated()},
+          {"dissipated_by_drag", 0 - e.drag_work},
+          {"dissipated_by_steps", e.numerical()},
+          {"loads_work", e.load_work},
+          {"motion_work", e.motion_work},
+          {"injected", e.injected}};
+}
+
 Json report_json(const Build& build, const RunResult& run, const StateMeasures& m, double write_seconds) {
   const Scene& scene = build.scene;
   const System& system = *run.system;
@@ -114,7 +128,16 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                       {"p999_warp", m.strain.p999[1]},
                       {"mean_abs_weft", m.strain.mean_abs[0]},
                       {"mean_abs_warp", m.strain.mean_abs[1]},
+                      {"min_shear", m.shear.min},
+                      {"max_shear", m.shear.max},
+                      {"mean_abs_shear", m.shear.mean_abs},
                       {"at_constraints_max", m.at_constraints_max}};
+  if (system.strain_rows > 0) {
+    report["strain"]["at_constraints"] = {{"min_weft", m.at_constraints.min[0]},
+                                          {"max_weft", m.at_constraints.max[0]},
+                                          {"min_warp", m.at_constraints.min[1]},
+                                          {"max_warp", m.at_constraints.max[1]}};
+  }
   // One number, or what a band allows: [weft, warp] where the scene names a limit.
   const StrainLimit& limit = scene.strain_limit;
   if (limit.on && limit.weft.slack == 0) report["strain"]["limit"] = limit.tolerance;
@@ -139,25 +162,16 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
     report["stress"]["raw"] = stress(m.raw_nominal);
     report["stress"]["raw"]["second_pk"] = stress(m.raw_second_pk);
   }
-  const EnergyBalance& e = run.energy;
-  report["energy"] = {{"kinetic", e.kinetic},
-                      {"membrane", e.membrane},
-                      {"bending", e.bending},
-                      {"limit", e.limit},
-                      {"gravity", e.gravity},
-                      {"dissipated", e.dissipated()},
-                      {"dissipated_by_drag", -e.drag_work},
-                      {"dissipated_by_steps", e.numerical()},
-                      {"loads_work", e.load_work},
-                      {"motion_work", e.motion_work},
-                      {"injected", e.injected}};
+  report["energy"] = Json::object();
+  for (const auto& [what, joule] : energy_entries(run.energy)) report["energy"][what] = joule;
   report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
                           {"iterations_max", run.iterations_max},
                           {"gram_nonzeros", system.projection ? system.projection->gram_nonzeros() : 0},
                           {"unconverged_steps", run.unconverged_steps},
                           {"solver", scene.strain_limit.solver == LimitSolver::lagrange ? "lagrange" : "projection"}};
-  report["contact"] = {{"max_penetration", 0.0}, {"min_distance", nullptr}};  // nothing touches in this version
-  report["seams"] = {{"max_gap", 0.0}};
+  // Numbers of what doesn't exist in a run are null, not 0: nothing touches and nothing is sewn in this version.
+  report["contact"] = {{"max_penetration", nullptr}, {"min_distance", nullptr}};
+  report["seams"] = {{"max_gap", nullptr}};
   Json stages = Json::array({"shell"});
   if (system.projection) stages.push_back("projection");
   report["stages"] = stages;
@@ -170,11 +184,6 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   counters["steps"] = {{"count", run.steps + run.redone_steps}};
   counters["time_step"] = {{"seconds", run.bound_seconds}};
   if (!scene.formats.empty()) counters["frames"] = {{"seconds", run.frame_seconds}};
-  if (run.allocations.known) {
-    counters["steps"]["allocations"] = run.allocations.steps;
-    counters["time_step"]["allocations"] = run.allocations.bound;
-    if (!scene.formats.empty()) counters["frames"]["allocations"] = run.allocations.frames;
-  }
   report["counters"] = counters;
   Json warnings = Json::array();
   for (const std::string& w : build.warnings) warnings.push_back(w);

@@ -49,7 +49,6 @@ class Loop {
   Loop(const Build& build, RunResult from, const RunHooks& hooks)
       : build_(build), scene_(build.scene), hooks_(hooks), result_(std::move(from)) {
     result_.from = result_.state.t;
-    result_.allocations.known = static_cast<bool>(hooks.allocations);
   }
 
   RunResult operator()() {
@@ -81,11 +80,7 @@ class Loop {
     if (result_.exit == RunExit::ok && scene_.rest && !at_rest()) report_unrest();
     if (result_.exit == RunExit::ok) check_energy();
     result_.time = result_.state.t;
-    const Eigen::VectorXd moved = control_points(*result_.system, result_.state) - build_.start;
-    result_.energy.gravity = 0;
-    for (int i = 0; i < build_.model->control_point_count(); ++i) {
-      result_.energy.gravity -= build_.model->lumped_mass()[i] * scene_.gravity.dot(moved.segment<3>(3 * i));
-    }
+    weigh();
     result_.wall_seconds = since(start_);
     return std::move(result_);
   }
@@ -128,9 +123,18 @@ class Loop {
     }
   }
 
-  long allocations() const { return hooks_.allocations ? hooks_.allocations() : 0; }
-  void resumable() const {
-    if (hooks_.resumable) hooks_.resumable(result_);
+  // The potential of gravity, which no step needs.
+  void weigh() {
+    const Eigen::VectorXd moved = control_points(*result_.system, result_.state) - build_.start;
+    result_.energy.gravity = 0;
+    for (int i = 0; i < build_.model->control_point_count(); ++i) {
+      result_.energy.gravity -= build_.model->lumped_mass()[i] * scene_.gravity.dot(moved.segment<3>(3 * i));
+    }
+  }
+  void resumable() {
+    if (!hooks_.resumable) return;
+    weigh();
+    hooks_.resumable(result_);
   }
   void finish_target(double t) {
     result_.loop.done = t;
@@ -186,10 +190,8 @@ class Loop {
   }
   TimeStepBound ask_for_bound() {
     const Clock::time_point start = Clock::now();
-    const long asked = allocations();
     const TimeStepBound bound = bound_of(*result_.system);
     result_.bound_seconds += since(start);
-    result_.allocations.bound += allocations() - asked;
     return bound;
   }
 
@@ -235,11 +237,9 @@ class Loop {
       return;
     }
     for (bool halved = false;; halved = true) {
-      const long asked = allocations();
       const StepReport report = step(result_.system->dynamic, result_.state, dt, work_);
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
-      result_.allocations.steps += allocations() - asked;
       const std::string trouble = judge(report);
       if (trouble.empty()) {
         accept(report);
@@ -284,7 +284,7 @@ class Loop {
   }
   std::string unrest() const {
     const double left = result_.relaxation.remaining;
-    return std::isfinite(left) ? fmt::format("some point still swings by {:.3g} m when let go", left)
+    return std::isfinite(left) ? fmt::format("a point would still move by {:.3g} m if released", left)
                                : "the cloth is still on its way";
   }
   void report_unrest() {
@@ -302,7 +302,7 @@ class Loop {
     if (!(e.injected > scene_.energy_gain * turned) || !(e.injected > result_.loop.rounding)) return;
     result_.exit = RunExit::check_failed;
     result_.reason = fmt::format(
-        "the energy rose by {:.2g} % of what was turned over without work that would explain it, allowed are {:.2g} % "
+        "the energy grew by {:.2g} % of the energy exchanged with no matching work, allowed are {:.2g} % "
         "(solver.energy_gain): a smaller dt or a lower strain_limit.stiffness is more accurate",
         100 * e.injected / turned, 100 * scene_.energy_gain);
   }
@@ -334,14 +334,13 @@ class Loop {
         bounded() && !hard_limit() && result_.loop.dt_scale > smallest_careful && result_.steps >= first_steps;
     const double rise = balance - (careful ? result_.loop.trough : result_.loop.balance);
     if (rise > (careful ? small_rise : step_rise) * turned + smaller_step + result_.loop.rounding) {
-      return fmt::format("the energy rises by {:.3g} J without work that would explain it ({:.3g} J turned over)", rise,
-                         turned);
+      return fmt::format("energy grew by {:.3g} J with no matching work ({:.3g} J exchanged so far)", rise, turned);
     }
     // What the end of the step holds can't exceed the budget either.
     const double stored = report.kinetic_end + elastic - e.start - e.load_work - e.drag_work - e.motion_work -
                           report.load_work - report.drag_work - report.motion_work;
     if (std::max(balance, stored) > total_rise * turned + result_.loop.rounding) {
-      return fmt::format("the energy has risen by {:.3g} J without work that would explain it ({:.3g} J turned over)",
+      return fmt::format("energy has grown by {:.3g} J with no matching work ({:.3g} J exchanged so far)",
                          std::max(balance, stored), turned);
     }
     result_.loop.scale = turned;
@@ -409,7 +408,6 @@ class Loop {
 
   void emit_frame() {
     const Clock::time_point start = Clock::now();
-    const long asked = allocations();
     const int number = result_.frames++;
     result_.frame_times.push_back(result_.state.t);
     if (!hooks_.frame) return;
@@ -417,7 +415,6 @@ class Loop {
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
     hooks_.frame({number, result_.state.t, result_.dt_last, *result_.system, q, v});
     result_.frame_seconds += since(start);
-    result_.allocations.frames += allocations() - asked;
   }
 
   std::string worst_place() const {
@@ -509,6 +506,7 @@ double rest_tolerance(const Build& build) {
 }
 
 std::vector<double> frame_times(const Scene& scene) {
+  if (!std::isfinite(scene.until)) throw std::logic_error("a run until rest has no last frame");
   std::vector<double> times;
   for (int k = 0;; ++k) {
     const double t = k * scene.every;

@@ -64,12 +64,6 @@ struct LoopState {
   double kick = 0;                             // J, of the last accepted step: what a smaller step may seem to gain
 };
 
-// Calls of the memory allocator; warming up is among them.
-struct AllocationCounts {
-  bool known = false;
-  long steps = 0, bound = 0, frames = 0;
-};
-
 // All of a run that a later one needs to go on with the same bits, and nothing that depends on the clock. A field more:
 // a word in checkpoint.cpp.
 struct RunState {
@@ -99,7 +93,6 @@ struct RunResult : RunState {
   // Of this process alone, which began at `from` [s].
   double from = 0;
   double wall_seconds = 0, force_seconds = 0, projection_seconds = 0, bound_seconds = 0, frame_seconds = 0;
-  AllocationCounts allocations;
 };
 
 struct RunHooks {
@@ -107,7 +100,6 @@ struct RunHooks {
   std::function<void(const RunProgress&)> progress;  // after each step
   // After the first frame, each step and each later frame: a run may be taken up from here.
   std::function<void(const RunResult&)> resumable;
-  std::function<long()> allocations;  // of the program so far; unset: not counted
   std::function<RunExit()> stop;  // asked after each step, so that every run gets ahead; not ok: finish now with this
 };
 

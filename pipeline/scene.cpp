@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "geometry/error.h"
+#include "geometry/measure.h"
 #include "io/file.h"
 #include "io/panel_file.h"
 #include "pipeline/toml_table.h"
@@ -215,6 +216,9 @@ ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fab
   if (!std::filesystem::exists(panel.file, error)) {
     table.fail(*table.raw().get(key), fmt::format("{} '{}' does not exist", key, panel.file.string()));
   }
+  panel.choice.size = table.string("size").value_or("");
+  panel.choice.unit = table.string("unit").value_or("");
+  if (const auto outline = table.choice("outline", {"cut", "sew"}, {})) panel.choice.outline = *outline;
   panel.start = table.string("start");
   if (auto refine = table.table("refine", "refine")) {
     panel.degree = refine->integer("degree", 2, 5);
@@ -309,6 +313,22 @@ SceneTraction read_traction(Table table, const std::vector<ScenePanel>& panels) 
   return traction;
 }
 
+// curves = [0, 1, 2]; empty where there is no such key.
+std::vector<int> read_curves(Table& table) {
+  const toml::node* node = table.find("curves");
+  if (!node) return {};
+  std::vector<int> out;
+  const toml::array* array = node->as_array();
+  for (std::size_t k = 0; array && k < array->size(); ++k) {
+    const auto number = (*array)[k].value<std::int64_t>();
+    if (!number || *number < 0 || *number > 1000000) array = nullptr;
+    if (number) out.push_back(static_cast<int>(*number));
+  }
+  if (!array || out.empty())
+    table.fail(*node, "curves must be an array of the curves' numbers in their loop, such as [0, 1]");
+  return out;
+}
+
 SeamSide read_seam_side(Table& seam, const char* key, const std::vector<ScenePanel>& panels) {
   auto table = seam.table(key, fmt::format("{} of [[seam]]", key));
   if (!table) seam.missing(key, "one side, such as { panel = \"front\", loop = 0, curve = 1 }");
@@ -316,8 +336,18 @@ SeamSide read_seam_side(Table& seam, const char* key, const std::vector<ScenePan
   side.panel = panel_key(*table, panels);
   side.loop = table->integer("loop", 0, 1000000).value_or(0);
   const auto curve = table->integer("curve", 0, 1000000);
-  if (!curve) table->missing("curve", "its number in the loop; toile inspect shows it");
-  side.curve = *curve;
+  side.curves = read_curves(*table);
+  if (curve && !side.curves.empty())
+    table->fail(*table->raw().get("curves"), "a side has a curve or curves = [...], not both");
+  if (curve) side.curves = {*curve};
+  if (side.curves.empty()) table->missing("curve", "its number in the loop; toile inspect shows it");
+  table->number(side.from, "from", dimension::none, Range::nonnegative);
+  table->number(side.to, "to", dimension::none, Range::positive);
+  if (!(side.from < side.to && side.to <= 1)) {
+    throw InputError(
+        fmt::format("{}: a side runs from {} to {} of its length, must be fractions of 0 to 1, from below to",
+                    table->where(), side.from, side.to));
+  }
   side.reverse = table->boolean("reverse").value_or(false);
   table->done();
   return side;
@@ -329,9 +359,13 @@ SceneSeam read_seam(Table table, const std::vector<ScenePanel>& panels) {
   seam.a = read_seam_side(table, "a", panels);
   seam.b = read_seam_side(table, "b", panels);
   table.done();
-  if (seam.a.panel == seam.b.panel && seam.a.loop == seam.b.loop && seam.a.curve == seam.b.curve) {
+  for (const int curve : seam.a.curves) {
+    const bool there = std::ranges::find(seam.b.curves, curve) != seam.b.curves.end();
+    const bool apart = seam.a.to <= seam.b.from || seam.b.to <= seam.a.from;
+    const bool part = seam.a.curves == seam.b.curves && apart;
+    if (seam.a.panel != seam.b.panel || seam.a.loop != seam.b.loop || !there || part) continue;
     throw InputError(fmt::format("{}: the seam joins curve {},{} of panel '{}' with itself", seam.where, seam.a.loop,
-                                 seam.a.curve, seam.a.panel));
+                                 curve, seam.a.panel));
   }
   return seam;
 }
@@ -362,26 +396,25 @@ SceneObstacle read_obstacle(Table table, const std::filesystem::path& scene) {
   return obstacle;
 }
 
+FrameFormat frame_format(Table& table, const toml::node& entry) {
+  static const std::vector<std::string> names{"iges", "vtu", "obj", "ply", "stl", "glb", "json", "csv"};
+  const std::string name = entry.value<std::string>().value_or("");
+  const auto found = std::ranges::find(names, name);
+  if (found == names.end())
+    table.fail(entry, fmt::format("unknown frame format '{}'{}", name, suggestion(name, names)));
+  return static_cast<FrameFormat>(found - names.begin());
+}
+
 void read_output(Table table, Scene& scene) {
   table.number(scene.every, "every", dimension::time, Range::positive);
   if (const toml::node* node = table.find("formats")) {
     const toml::array* array = node->as_array();
     if (!array) table.fail(*node, "formats in [output] must be an array such as [\"iges\", \"vtu\"]");
     scene.formats.clear();
-    for (const toml::node& entry : *array) {
-      const std::string name = entry.value<std::string>().value_or("");
-      if (name == "iges") {
-        scene.formats.push_back(FrameFormat::iges);
-      } else if (name == "vtu") {
-        scene.formats.push_back(FrameFormat::vtu);
-      } else if (name == "obj") {
-        scene.formats.push_back(FrameFormat::obj);
-      } else if (name == "ply" || name == "stl" || name == "glb" || name == "gltf") {
-        table.fail(entry, fmt::format("frames as {} are not supported by this version; use iges, vtu or obj", name));
-      } else {
-        table.fail(entry, fmt::format("unknown frame format '{}'{}", name, suggestion(name, {"iges", "vtu", "obj"})));
-      }
-    }
+    for (const toml::node& entry : *array) scene.formats.push_back(frame_format(table, entry));
+  }
+  if (const auto rows = table.choice("history", {"frame", "step", "off"}, {})) {
+    scene.history = *rows == "off" ? HistoryRows::off : *rows == "step" ? HistoryRows::steps : HistoryRows::frames;
   }
   if (const auto preview = table.boolean("preview")) scene.preview = *preview;
   for (Table& point : table.tables("points", "points")) {
@@ -577,7 +610,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
     scene.panels.push_back(read_panel(table, path, fabrics));
     ScenePanel& panel = scene.panels.back();
     for (std::size_t k = 0; k + 1 < scene.panels.size(); ++k) {
-      if (scene.panels[k].file == panel.file) ++panel.order;
+      if (scene.panels[k].file == panel.file && scene.panels[k].choice == panel.choice) ++panel.order;
       if (!panel.name.empty() && scene.panels[k].name == panel.name) {
         throw InputError(fmt::format("{}: two panels are called '{}'", panel.where, panel.name));
       }
@@ -630,8 +663,23 @@ Scene read_scene(const std::filesystem::path& path, std::span<const std::string>
   return parse_scene(read_file(path), path, settings);
 }
 
+namespace {
+
+// A span that shows how a panel of this size drapes, some 24 along its longer side, in whole millimetres; nothing where
+// the file's own knots are that fine already.
+std::optional<double> draping_span(const TrimmedSurface& face) {
+  constexpr double spans = 24;
+  const double size = bounding_box(face.surface).diagonal().maxCoeff() * face.metres_per_unit;
+  const auto count = std::max(face.surface.u().spans().size(), face.surface.v().spans().size());
+  if (!(size > 0) || static_cast<double>(count) >= spans / 2) return std::nullopt;
+  const double millimetres = std::ceil(1000 * size / spans);
+  return std::max(1.0, millimetres) / 1000;
+}
+
+}  // namespace
+
 Scene quick_scene(const QuickScene& request, std::span<const std::string> settings) {
-  const PanelFile file = read_panels(request.file);
+  const PanelFile file = read_panels(request.file, request.choice);
   const auto has = [&](const std::string& name) {
     return std::ranges::any_of(file.panels, [&](const TrimmedSurface& face) { return face.name == name; });
   };
@@ -647,6 +695,7 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
     panel.name = file.panels[k].name;
     panel.where = request.file.string();
     panel.file = request.file;
+    panel.choice = request.choice;
     if (ends(panel.name, draped_suffix) && has(stem_of(panel.name, draped_suffix) + std::string(flat_suffix))) continue;
     if (ends(panel.name, flat_suffix) && has(stem_of(panel.name, flat_suffix) + std::string(draped_suffix))) {
       panel.start = stem_of(panel.name, flat_suffix) + std::string(draped_suffix);
@@ -658,6 +707,13 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
     if (!panel.start) {
       panel.degree = request.degree;
       panel.span = request.span;
+      if (!request.span) {
+        if (const auto chosen = draping_span(file.panels[k])) {
+          panel.span = chosen;
+          scene.notes.push_back(
+              fmt::format("panel '{}': refined to spans of {} mm (--span chooses others)", panel.name, 1000 * *chosen));
+        }
+      }
     }
     panel.fabric_name = request.fabric;
     const auto presets = fabric_presets();
@@ -687,6 +743,9 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
     scene.keys.emplace_back(fmt::format("--pin {}", k), request.pins[k]);
   }
   scene.keys.emplace_back("--fabric", request.fabric);
+  if (!request.choice.size.empty()) scene.keys.emplace_back("--size", request.choice.size);
+  if (!request.choice.unit.empty()) scene.keys.emplace_back("--unit", request.choice.unit);
+  if (!request.choice.outline.empty()) scene.keys.emplace_back("--outline", request.choice.outline);
   if (request.degree) scene.keys.emplace_back("--degree", fmt::format("{}", *request.degree));
   if (request.span) scene.keys.emplace_back("--span", fmt::format("{} m", *request.span));
   list_keys(root, "", scene.keys);

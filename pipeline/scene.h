@@ -12,6 +12,7 @@
 #include "analysis/fabric/fabric.h"
 #include "analysis/projection/fast_projection.h"
 #include "analysis/projection/point_rule.h"
+#include "io/panel_file.h"
 #include "pipeline/addresses.h"
 
 namespace toile {
@@ -28,6 +29,7 @@ struct ScenePanel {
   bool named = true;                 // false: `name` was made up, the face is taken by its order
   int order = 0;                     // of this panel among those of the scene that come from the same file
   std::filesystem::path file;        // IGES or pattern
+  PanelChoice choice;                // of what the file holds: size, unit, outline
   std::optional<std::string> start;  // face of the same file and knots whose net is the initial place; else the rest
   std::optional<int> degree;
   std::optional<double> span;  // m
@@ -65,10 +67,13 @@ struct SceneTraction {
   std::string where;
 };
 
-// A curve of a panel that is sewn; the seam runs from the curve's start to its end, or against it.
+// A side of a seam: curves of a loop, each in its own direction and one after the other, and of the line that they make
+// the part between two fractions of its length; run backwards where `reverse`.
 struct SeamSide {
   std::string panel;
-  int loop = 0, curve = 0;  // the file's numbers
+  int loop = 0;             // the file's numbers
+  std::vector<int> curves;  // at least one
+  double from = 0, to = 1;
   bool reverse = false;
 };
 // Read and checked; not simulated yet.
@@ -113,7 +118,10 @@ struct OutputPoint {
   std::string where;
 };
 
-enum class FrameFormat { iges, vtu, obj };
+enum class FrameFormat { iges, vtu, obj, ply, stl, glb, json, csv };
+
+// The rows of history.csv.
+enum class HistoryRows { off, frames, steps };
 
 // Complete, SI, every key consumed.
 struct Scene {
@@ -134,9 +142,11 @@ struct Scene {
   std::optional<double> time_limit;      // s of wall time for the program; unset: none
   double every = 1.0 / 30;               // s between frames
   std::vector<FrameFormat> formats{FrameFormat::vtu};
+  HistoryRows history = HistoryRows::frames;
   bool preview = true;
   std::vector<OutputPoint> points;
   std::vector<std::pair<std::string, std::string>> keys;  // as written: "panel.0.grain_deg", "45"
+  std::vector<std::string> notes;                         // what was chosen for the user, to be said
 };
 
 // Reads a scene; `settings` are "key.path=value" with TOML values (a value that isn't TOML is taken as a string) and
@@ -148,6 +158,7 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, std:
 // flat and a draped face of one name (draped.igs) make one panel that starts from the draped one.
 struct QuickScene {
   std::filesystem::path file;
+  PanelChoice choice;
   std::vector<std::string> pins;
   std::optional<int> degree;
   std::optional<double> span;  // m

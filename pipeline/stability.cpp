@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 
 #include "geometry/error.h"
 #include "io/file.h"
+#include "io/vtu_arrays.h"
 #include "pipeline/study.h"
 
 namespace toile {
@@ -23,9 +23,11 @@ constexpr double largest_injection = 0.01;  // of the work of gravity
 constexpr double smallest_fall = 1e-6;
 constexpr double standard_gravity = 9.81;
 
-// Where a JSON value holds null, the way in which a number that isn't finite is written.
+// Where a JSON value holds null, the way in which a number that isn't finite is written. What contact and seams say is
+// null in a run that has none.
 std::string null_in(const Json& json, const std::string& path) {
-  if (json.is_null()) return path == "contact.min_distance" ? "" : path;  // null: nothing is near
+  if (path == "contact" || path == "seams") return "";
+  if (json.is_null()) return path;
   if (!json.is_structured()) return "";
   for (const auto& [key, value] : json.items()) {
     const std::string found = null_in(value, path.empty() ? key : path + "." + key);
@@ -55,13 +57,6 @@ std::string word_in(std::string_view text) {
   return "";
 }
 
-std::string attribute(std::string_view tag, std::string_view name) {
-  const std::size_t at = tag.find(std::string(" ") + std::string(name) + "=\"");
-  if (at == std::string_view::npos) return "";
-  const std::size_t from = at + name.size() + 3;
-  return std::string(tag.substr(from, tag.find('"', from) - from));
-}
-
 template <class Number>
 bool all_finite(std::string_view bytes) {
   for (std::size_t k = 0; k + sizeof(Number) <= bytes.size(); k += sizeof(Number)) {
@@ -72,33 +67,52 @@ bool all_finite(std::string_view bytes) {
   return true;
 }
 
-// The name of an appended array of a VTU file that isn't finite; raw little-endian data after "_", as VtuSink writes
-// it.
-std::string vtu_array(std::string_view text) {
-  const std::size_t head = text.find("<AppendedData");
-  const std::size_t data = head == std::string_view::npos ? head : text.find('_', head);
-  if (data == std::string_view::npos) return word_in(text).empty() ? "" : "its text";
-  const bool wide = text.substr(0, head).find("header_type=\"UInt64\"") != std::string_view::npos;
-  for (std::size_t at = 0; (at = text.find("<DataArray", at)) < head; ++at) {
-    const std::string_view tag = text.substr(at, text.find('>', at) - at);
-    const std::string type = attribute(tag, "type"), offset = attribute(tag, "offset");
-    if (offset.empty() || !type.starts_with("Float")) continue;
-    std::uint64_t length = 0, start = 0;
-    std::from_chars(offset.data(), offset.data() + offset.size(), start);
-    const std::size_t from = data + 1 + start, length_bytes = wide ? 8 : 4;
-    if (from + length_bytes > text.size()) return attribute(tag, "Name") + " (cut short)";
-    std::memcpy(&length, text.data() + from, length_bytes);
-    const std::string_view bytes = text.substr(from + length_bytes, length);
-    if (bytes.size() < length) return attribute(tag, "Name") + " (cut short)";
-    if (!(type == "Float64" ? all_finite<double>(bytes) : all_finite<float>(bytes))) return attribute(tag, "Name");
+// The first array of a VTU file that holds a number that isn't finite, or what is wrong with the file.
+std::string not_finite_in_vtu(std::string_view file) {
+  const std::string word = word_in(file.substr(0, file.find(vtu_data_mark)));
+  if (!word.empty()) return word;
+  try {
+    for (const VtuArray& array : read_vtu_arrays(file)) {
+      if (array.type == "Float64" && !all_finite<double>(array.bytes)) return array.name;
+      if (array.type == "Float32" && !all_finite<float>(array.bytes)) return array.name;
+    }
+  } catch (const InputError& error) {
+    return error.what();
   }
   return "";
 }
 
-std::optional<double> number(const Json& report, const char* path) {
+std::optional<double> number(const Json& report, const std::string& path) {
   const Json::json_pointer pointer(path);
   if (!report.contains(pointer) || !report.at(pointer).is_number()) return std::nullopt;
   return report.at(pointer).get<double>();
+}
+
+// Where the strain of the limit's rows lies beyond the limit: one number for both directions and signs, or a band with
+// a range for each direction.
+std::string over_limit(const Json& report) {
+  const Json strain = report.value("strain", Json::object());
+  if (!strain.contains("limit")) return "";
+  if (const auto limit = number(report, "/strain/limit")) {
+    const double reached = number(report, "/strain/at_constraints_max").value_or(NAN);
+    if (reached <= *limit) return "";
+    return fmt::format("the strain reaches {:.3g}, its limit is {:.3g}", reached, *limit);
+  }
+  const double tolerance = number(report, "/strain/limit/tolerance").value_or(0);
+  for (const auto& [d, thread] : {std::pair(0, "weft"), std::pair(1, "warp")}) {
+    const auto end = [&](const char* sign, const char* extreme, double unlimited) {
+      const double allowed = number(report, fmt::format("/strain/limit/{}/{}", sign, d)).value_or(unlimited);
+      const double reached = number(report, fmt::format("/strain/at_constraints/{}_{}", extreme, thread)).value_or(NAN);
+      return std::pair(reached, allowed);
+    };
+    const auto [most, stretch] = end("stretch", "max", INFINITY);
+    if (!(most <= stretch + tolerance))
+      return fmt::format("the {} is stretched by {:.3g}, its limit is {:.3g}", thread, most, stretch);
+    const auto [least, compress] = end("compress", "min", INFINITY);
+    if (!(-least <= compress + tolerance))
+      return fmt::format("the {} is compressed by {:.3g}, its limit is {:.3g}", thread, std::abs(least), compress);
+  }
+  return "";
 }
 
 // Why a run that ended well isn't stable.
@@ -109,13 +123,10 @@ std::string instability(const Json& report) {
   const double area = number(report, "/measures/area/value").value_or(0);
   const double work = std::max(-*gravity, smallest_fall * mass * standard_gravity * std::sqrt(std::max(area, 0.0)));
   if (*injected > largest_injection * work) {
-    return fmt::format("{:.3g} J appeared from nowhere, {:.3g} times the work of gravity", *injected, *injected / work);
+    return fmt::format("energy grew by {:.3g} J with no matching work, {:.3g} times the work of gravity", *injected,
+                       *injected / work);
   }
-  const auto limit = number(report, "/strain/limit"), reached = number(report, "/strain/at_constraints_max");
-  if (limit && (!reached || *reached > *limit)) {
-    return fmt::format("the strain reaches {:.3g}, its limit is {:.3g}", reached.value_or(NAN), *limit);
-  }
-  return "";
+  return over_limit(report);
 }
 
 }  // namespace
@@ -132,7 +143,7 @@ std::string not_finite_in(const std::filesystem::path& directory) {
   for (const std::filesystem::path& file : files) {
     const std::string extension = file.extension().string(), shown = file.lexically_relative(directory).string();
     if (extension == ".vtu") {
-      const std::string array = vtu_array(read_file(file));
+      const std::string array = not_finite_in_vtu(read_file(file));
       if (!array.empty()) return fmt::format("{}: {}", shown, array);
     }
     if (!texts.contains(extension)) continue;

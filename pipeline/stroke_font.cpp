@@ -4,6 +4,8 @@
 #include <array>
 #include <string>
 
+#include "pipeline/json_text.h"
+
 namespace toile {
 
 namespace {
@@ -120,20 +122,42 @@ std::vector<Eigen::Vector2f> rounded(std::vector<Eigen::Vector2f> line) {
   return line;
 }
 
+const Glyph* find_glyph(char32_t character) {
+  const auto glyph = std::ranges::find_if(glyphs, [=](const Glyph& g) {
+    return static_cast<char32_t>(static_cast<unsigned char>(g.character)) == character;
+  });
+  return glyph == glyphs.end() ? nullptr : &*glyph;
+}
+
 }  // namespace
+
+std::vector<char32_t> code_points(std::string_view text) {
+  const std::string valid = utf8(std::string(text));
+  std::vector<char32_t> out;
+  for (const char c : valid) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte & 0xc0) == 0x80) {
+      out.back() = (out.back() << 6) | (byte & 0x3f);
+    } else {
+      out.push_back(byte < 0x80 ? byte : byte & (byte < 0xe0 ? 0x1f : byte < 0xf0 ? 0x0f : 0x07));
+    }
+  }
+  return out;
+}
+
+bool has_strokes(std::string_view text) {
+  return std::ranges::all_of(code_points(text), find_glyph);
+}
 
 TextStrokes text_strokes(std::string_view text, float size) {
   constexpr float digit_height = 12;
+  static constexpr Glyph box{'?', 8, "0e6e6q0q0e"};
   const float scale = size / digit_height;
   TextStrokes out;
-  for (const char c : text) {
-    if ((static_cast<unsigned char>(c) & 0xc0) == 0x80) continue;  // the rest of a UTF-8 character
-    const auto glyph = std::find_if(glyphs.begin(), glyphs.end(), [c](const Glyph& g) { return g.character == c; });
-    if (glyph == glyphs.end()) {
-      out.width += 6 * scale;
-      continue;
-    }
-    std::string_view rest = glyph->strokes;
+  for (const char32_t character : code_points(text)) {
+    const Glyph* found = find_glyph(character);
+    const Glyph& glyph = found ? *found : box;
+    std::string_view rest = glyph.strokes;
     while (!rest.empty()) {
       const std::size_t blank = std::min(rest.find(' '), rest.size());
       std::string_view stroke = rest.substr(0, blank);
@@ -146,7 +170,7 @@ TextStrokes text_strokes(std::string_view text, float size) {
                           -scale * static_cast<float>(stroke[k + 1] - 'e'));
       out.lines.push_back(round ? rounded(std::move(line)) : line);
     }
-    out.width += scale * static_cast<float>(glyph->advance);
+    out.width += scale * static_cast<float>(glyph.advance);
   }
   return out;
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -72,6 +73,7 @@ struct Study {
 
 // Throws InputError `study.toml:12: ...`, the nearest key named.
 Study read_study(const std::filesystem::path& path);
+Study parse_study(std::string_view text, const std::filesystem::path& path);
 
 enum class RunStatus { ok, check, refused, stopped, timeout, failed, not_run };
 const char* name(RunStatus status);  // as in study.csv

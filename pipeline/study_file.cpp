@@ -369,7 +369,11 @@ std::string study_name(const std::filesystem::path& path) {
 }  // namespace
 
 Study read_study(const std::filesystem::path& path) {
-  const toml::table root = parse_toml(read_file(path), path);
+  return parse_study(read_file(path), path);
+}
+
+Study parse_study(std::string_view text, const std::filesystem::path& path) {
+  const toml::table root = parse_toml(text, path);
   Table top(root, "the study", path.string());
   Study study;
   study.path = path;

@@ -2,10 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
+#include "geometry/text.h"
+#include "io/csv.h"
 #include "pipeline/json_text.h"
 #include "pipeline/plot.h"
 #include "pipeline/study.h"
@@ -16,27 +20,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string quoted(const std::string& cell) {
-  if (cell.find_first_of(",\"\r\n") == std::string::npos) return cell;
-  std::string out = "\"";
-  for (const char c : cell) out.append(c == '"' ? 2 : 1, c);
-  return out + '"';
-}
-
-std::string line(const std::vector<std::string>& cells) {
-  std::string out;
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    if (k > 0) out += ',';
-    out += quoted(cells[k]);
-  }
-  return out + "\n";
-}
-
 std::string exact(std::optional<double> value) {
-  return value ? fmt::format("{}", *value) : "";
-}
-std::string exact(const Eigen::VectorXd& value) {
-  return fmt::format("{}", fmt::join(value.data(), value.data() + value.size(), " "));
+  return value ? text(*value) : "";
 }
 std::string rounded(std::optional<double> value, int digits = 3) {
   return value ? fmt::format("{:.{}g}", *value, digits) : "";
@@ -254,56 +239,144 @@ bool varies(const StudyResult& result, const X& x_of) {
 
 }  // namespace
 
+namespace {
+
+// The parts of what may be several numbers: a varied array "[4, 5]", an entry of the report "1 2 3".
+std::vector<std::string> parts_of(const std::string& cell) {
+  std::string text = cell;
+  if (text.starts_with('[') && text.ends_with(']')) text = text.substr(1, text.size() - 2);
+  std::ranges::replace(text, ',', ' ');
+  std::vector<std::string> parts;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size()) return {cell};
+    parts.push_back(word);
+  }
+  return parts.empty() ? std::vector<std::string>{cell} : parts;
+}
+
+std::vector<std::string> parts_of(const Eigen::VectorXd& value) {
+  std::vector<std::string> parts;
+  for (const double x : value) parts.push_back(text(x));
+  return parts;
+}
+
+// Columns of one name: NAME where no run has more than one part, else NAME.0, NAME.1, ...; a number a cell.
+struct Column {
+  std::string name;
+  std::vector<std::vector<std::string>> rows;  // parts, a row a run
+
+  std::size_t width() const {
+    std::size_t most = 1;
+    for (const auto& parts : rows) most = std::max(most, parts.size());
+    return most;
+  }
+  void add_names(std::vector<std::string>& to) const {
+    const std::size_t n = width();
+    for (std::size_t k = 0; k < n; ++k) to.push_back(n == 1 ? name : fmt::format("{}.{}", name, k));
+  }
+  void add_cells(std::vector<std::string>& to, std::size_t row) const {
+    const std::size_t n = width();
+    for (std::size_t k = 0; k < n; ++k) to.push_back(k < rows[row].size() ? rows[row][k] : "");
+  }
+};
+
+class RunTable {
+ public:
+  void add(const std::string& name, std::vector<std::string> parts) {
+    if (rows_ == 0) columns_.push_back({name, {}});
+    columns_.at(next_++).rows.push_back(std::move(parts));
+  }
+  void add(const std::string& name, const std::string& cell) { add(name, std::vector<std::string>{cell}); }
+  void end_row() {
+    ++rows_;
+    next_ = 0;
+  }
+  std::string csv() const {
+    std::vector<std::string> cells;
+    for (const Column& column : columns_) column.add_names(cells);
+    std::string out = csv_row(cells);
+    for (std::size_t row = 0; row < rows_; ++row) {
+      cells.clear();
+      for (const Column& column : columns_) column.add_cells(cells, row);
+      out += csv_row(cells);
+    }
+    return out;
+  }
+
+ private:
+  std::vector<Column> columns_;
+  std::size_t rows_ = 0, next_ = 0;
+};
+
+// The number, or the length of several.
+std::string one_number(const Eigen::VectorXd& value) {
+  if (value.size() == 0) return "";
+  return text(value.size() == 1 ? value[0] : value.norm());
+}
+
+bool of_several_numbers(const StudyResult& result) {
+  return std::ranges::any_of(result.series, [](const SeriesResult& s) {
+    return s.reference.size() > 1 || std::ranges::any_of(s.cases, [](const CaseResult& c) {
+             return std::ranges::any_of(c.runs, [](const StudyRun& run) { return run.facts.value.size() > 1; });
+           });
+  });
+}
+
+std::string exit_text(const StudyRun& run) {
+  if (run.process.end != ProcessResult::End::exited || run.status == RunStatus::not_run) return "";
+  return fmt::format("{}", run.process.code);
+}
+
+}  // namespace
+
 std::string study_csv(const Study& study, const StudyResult& result) {
   const std::vector<std::string> keys = varied_keys(study);
-  std::vector<std::string> head{"model",   "scheme",       "mesh",     "degree", "spans",
-                                "dofs",    "dt",           "quantity", "value",  "reference",
-                                "error",   "wall_seconds", "status",   "unit",   "reference_uncertainty",
-                                "study",   "series",       "case",     "repeat", "exit",
-                                "verdict", "cause",        "run"};
-  head.insert(head.end(), study.columns.begin(), study.columns.end());
-  head.insert(head.end(), keys.begin(), keys.end());
-  std::string out = line(head);
+  const bool several = of_several_numbers(result);
+  RunTable table;
   for (std::size_t s = 0; s < study.series.size(); ++s) {
     const StudySeries& series = study.series[s];
     const SeriesResult& r = result.series[s];
     for (std::size_t k = 0; k < series.cases.size(); ++k) {
       for (const StudyRun& run : r.cases[k].runs) {
         const RunFacts& f = run.facts;
-        std::vector<std::string> cells{f.model,
-                                       f.scheme,
-                                       f.mesh,
-                                       f.degree,
-                                       f.spans,
-                                       exact(f.dofs),
-                                       exact(f.dt),
-                                       series.quantity.name,
-                                       exact(f.value),
-                                       exact(r.reference),
-                                       exact(run.error),
-                                       exact(f.wall_seconds),
-                                       name(run.status),
-                                       unit_of(series, f),
-                                       r.reference.size() > 0 && r.uncertainty >= 0 ? exact(r.uncertainty) : "",
-                                       study.name,
-                                       series.name,
-                                       series.cases[k].label,
-                                       fmt::format("{}", run.repeat + 1),
-                                       run.process.end == ProcessResult::End::exited && run.status != RunStatus::not_run
-                                           ? fmt::format("{}", run.process.code)
-                                           : "",
-                                       name(run.verdict),
-                                       run.cause,
-                                       run.id};
-        for (std::size_t i = 0; i < study.columns.size(); ++i) {
-          cells.push_back(i < f.columns.size() ? f.columns[i] : "");
-        }
-        for (const std::string& key : keys) cells.push_back(value_of(series.cases[k], key));
-        out += line(cells);
+        table.add("model", f.model);
+        table.add("scheme", f.scheme);
+        table.add("mesh", f.mesh);
+        table.add("degree", f.degree);
+        table.add("spans", f.spans);
+        table.add("dofs", exact(f.dofs));
+        table.add("dt", exact(f.dt));
+        table.add("quantity", series.quantity.name);
+        table.add("value", one_number(f.value));
+        table.add("reference", one_number(r.reference));
+        table.add("error", exact(run.error));
+        table.add("wall_seconds", exact(f.wall_seconds));
+        table.add("status", name(run.status));
+        table.add("unit", unit_of(series, f));
+        table.add("reference_uncertainty", r.reference.size() > 0 && r.uncertainty >= 0 ? text(r.uncertainty) : "");
+        table.add("study", study.name);
+        table.add("series", series.name);
+        table.add("case", series.cases[k].label);
+        table.add("repeat", fmt::format("{}", run.repeat + 1));
+        table.add("exit", exit_text(run));
+        table.add("verdict", name(run.verdict));
+        table.add("cause", run.cause);
+        table.add("run", run.id);
+        table.add("spans_u", exact(f.spans_u));
+        table.add("spans_v", exact(f.spans_v));
+        if (several) table.add("value", parts_of(f.value));
+        if (several) table.add("reference", parts_of(r.reference));
+        for (std::size_t i = 0; i < study.columns.size(); ++i)
+          table.add(study.columns[i], i < f.columns.size() ? parts_of(f.columns[i]) : std::vector<std::string>{});
+        for (const std::string& key : keys) table.add(key, parts_of(value_of(series.cases[k], key)));
+        table.end_row();
       }
     }
   }
-  return out;
+  return table.csv();
 }
 
 std::string study_table(const Study& study, const StudyResult& result) {
@@ -438,8 +511,10 @@ std::vector<std::pair<std::string, std::string>> study_plots(const Study& study,
   if (compared(study)) {
     plots.emplace_back("error_over_time.svg",
                        log_plot_svg(error_plot(study, result, "wall time [s], median and spread", true, wall)));
-    plots.emplace_back("error_over_dofs.svg",
-                       log_plot_svg(error_plot(study, result, "degrees of freedom", false, dofs)));
+    if (varies(result, dofs)) {
+      plots.emplace_back("error_over_dofs.svg",
+                         log_plot_svg(error_plot(study, result, "degrees of freedom", false, dofs)));
+    }
     if (varies(result, dt)) {
       plots.emplace_back("error_over_dt.svg", log_plot_svg(error_plot(study, result, "time step [s]", false, dt)));
     }

@@ -218,7 +218,6 @@ void classify(StudyRun& run, const fs::path& log, const ProcessLimits& limits) {
     run.cause = fmt::format("killed by signal {} ({})", p.code, strsignal(p.code));
     return;
   }
-  constexpr int out_of_time = 7;  // design.md: stopped by a time limit
   switch (p.code) {
     case exit_ok:
       run.status = RunStatus::ok;
@@ -232,7 +231,7 @@ void classify(StudyRun& run, const fs::path& log, const ProcessLimits& limits) {
       run.status = RunStatus::refused;
       return;
     case exit_solver:
-    case out_of_time:
+    case exit_time_limit:
       run.status = RunStatus::stopped;
       return;
     default:

@@ -4,6 +4,9 @@
 #include <charconv>
 #include <cmath>
 
+#include "io/xml_text.h"
+#include "pipeline/json_text.h"
+
 namespace toile {
 
 std::string svg_number(double value) {
@@ -13,23 +16,12 @@ std::string svg_number(double value) {
 }
 
 std::string svg_escape(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else if (c == '"') {
-      out += "&quot;";
-    } else if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) > 0x7e) {
-      out += '?';  // names in IGES files come in any encoding; XML takes only valid ones
-    } else {
-      out += c;
-    }
+  std::string valid = utf8(std::string(text));
+  // XML has no place for other control characters.
+  for (char& c : valid) {
+    if ((static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') || c == 0x7f) c = '?';
   }
-  return out;
+  return xml_text(valid);
 }
 
 std::string svg_path(std::span<const Eigen::Vector2d> points, bool closed) {

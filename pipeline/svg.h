@@ -11,6 +11,8 @@ namespace toile {
 
 // Two decimals, no minus zero: a thousandth of a pixel is nothing to see.
 std::string svg_number(double value);
+// For XML and HTML: UTF-8 (other bytes count as Latin-1), line breaks and tabs stay, other control characters become
+// question marks.
 std::string svg_escape(std::string_view text);
 
 // "M x y L x y ..." with Z at the end where closed.

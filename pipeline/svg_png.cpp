@@ -7,7 +7,6 @@
 
 #include "geometry/error.h"
 #include "pipeline/image.h"
-#include "pipeline/stroke_font.h"
 #include "pipeline/svg.h"
 
 namespace toile {
@@ -74,20 +73,17 @@ class Painter {
  public:
   Painter(int width, int height, std::string_view sheet) : image_(width, height), sheet_(read_sheet(sheet)) {
     std::ranges::fill(image_.linear, Vector3f(1, 1, 1));
-    cover_.resize(static_cast<std::size_t>(width) + 2);
   }
   void draw(const SvgItem& item);
   const Image& image() const { return image_; }
 
  private:
   Paint paint_of(const std::string& style, bool text) const;
-  void fill(const std::vector<Points>& polygons, const Vector3f& colour, float opacity, bool even_odd);
   void stroke(const Points& line, const Vector3f& colour, double width);
   void text(const SvgItem& item, const Paint& paint);
 
   Image image_;
   std::map<std::string, Rules, std::less<>> sheet_;
-  std::vector<float> cover_;
 };
 
 Paint Painter::paint_of(const std::string& style, bool text) const {
@@ -166,72 +162,6 @@ Path read_path(std::string_view data) {
   return out;
 }
 
-// Scan lines at five heights a pixel row; along x the cover is exact.
-void Painter::fill(const std::vector<Points>& polygons, const Vector3f& colour, float opacity, bool even_odd) {
-  constexpr int samples = 5;
-  // The part of the picture that the polygons reach.
-  const Vector2d size(image_.width, image_.height);
-  Vector2d low = size, high = Vector2d::Zero();
-  for (const Points& polygon : polygons)
-    for (const Vector2d& p : polygon) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  low = low.cwiseMax(0), high = high.cwiseMin(size);
-  const int first = static_cast<int>(low.y()), last = std::min(image_.height - 1, static_cast<int>(high.y()));
-  const int left = static_cast<int>(low.x()), right = std::min(image_.width - 1, static_cast<int>(high.x()));
-  // Edges by the row where they begin, so that a row looks at those that reach it.
-  struct Edge {
-    Vector2d a, b;
-    int sign;
-  };
-  std::vector<Edge> edges;
-  for (const Points& polygon : polygons)
-    for (std::size_t k = 0; k < polygon.size(); ++k) {
-      Vector2d a = polygon[k], b = polygon[(k + 1) % polygon.size()];
-      if (a.y() == b.y()) continue;
-      const int sign = a.y() < b.y() ? 1 : -1;
-      if (sign < 0) std::swap(a, b);
-      edges.push_back({a, b, sign});
-    }
-  std::ranges::sort(edges, {}, [](const Edge& e) { return e.a.y(); });
-  std::vector<Edge> active;
-  std::size_t next = 0;
-  for (int row = first; row <= last; ++row) {
-    for (; next < edges.size() && edges[next].a.y() < row + 1; ++next) active.push_back(edges[next]);
-    std::erase_if(active, [&](const Edge& e) { return e.b.y() < row; });
-    if (active.empty()) continue;
-    std::fill(cover_.begin() + left, cover_.begin() + std::max(left, right) + 2, 0.0f);
-    std::vector<std::pair<double, int>> meets;
-    for (int k = 0; k < samples; ++k) {
-      const double y = row + (k + 0.5) / samples;
-      meets.clear();
-      for (const Edge& e : active)
-        if (e.a.y() <= y && y < e.b.y())
-          meets.emplace_back(e.a.x() + (y - e.a.y()) / (e.b.y() - e.a.y()) * (e.b.x() - e.a.x()), e.sign);
-      std::ranges::sort(meets);
-      int winding = 0;
-      for (std::size_t m = 0; m + 1 < meets.size(); ++m) {
-        winding += even_odd ? 1 : meets[m].second;
-        if (even_odd ? winding % 2 == 0 : winding == 0) continue;
-        const double from = std::clamp(meets[m].first, 0.0, static_cast<double>(image_.width));
-        const double to = std::clamp(meets[m + 1].first, 0.0, static_cast<double>(image_.width));
-        const int x0 = static_cast<int>(from), x1 = static_cast<int>(to);
-        const auto add = [&](int x, double amount) {
-          cover_[static_cast<std::size_t>(x)] += static_cast<float>(amount / samples);
-        };
-        if (x0 == x1) {
-          add(x0, to - from);
-        } else {
-          add(x0, x0 + 1 - from);
-          for (int x = x0 + 1; x < x1; ++x) add(x, 1);
-          add(x1, to - x1);
-        }
-      }
-    }
-    for (int x = left; x <= right; ++x)
-      if (cover_[static_cast<std::size_t>(x)] > 0)
-        image_.blend(x, row, colour, opacity * std::min(1.0f, cover_[static_cast<std::size_t>(x)]));
-  }
-}
-
 // The union of its segments' rectangles and of discs at the joints, as one polygon set with nonzero winding: all of
 // them run the same way round.
 void Painter::stroke(const Points& line, const Vector3f& colour, double width) {
@@ -251,24 +181,32 @@ void Painter::stroke(const Points& line, const Vector3f& colour, double width) {
     }
     parts.push_back(std::move(disc));
   }
-  fill(parts, colour, strength, false);
+  fill_polygons(image_, parts, colour, strength);
 }
 
 void Painter::text(const SvgItem& item, const Paint& paint) {
   const float size = static_cast<float>(0.72 * item.size);  // digits of a font are lower than its size
-  const TextStrokes strokes = text_strokes(item.words, size);
+  const TextShape shape = text_shape(item.words, size);
   Vector2d at = item.at;
-  if (item.anchor != TextAnchor::start) at.x() -= item.anchor == TextAnchor::middle ? strokes.width / 2 : strokes.width;
-  const double pen = std::max(1.1, 0.12 * item.size);
-  const auto write = [&](const Vector3f& colour, double width) {
-    for (const auto& line : strokes.lines) {
-      Points points;
-      for (const auto& p : line) points.push_back(at + p.cast<double>());
-      stroke(points, colour, width);
-    }
+  if (item.anchor != TextAnchor::start) at.x() -= item.anchor == TextAnchor::middle ? shape.width / 2 : shape.width;
+  const auto placed = [&](const std::vector<Eigen::Vector2f>& line) {
+    Points points;
+    for (const auto& p : line) points.push_back(at + p.cast<double>());
+    return points;
   };
-  if (paint.halo) write(Vector3f(1, 1, 1), pen + 2.4);
-  write(paint.fill.value_or(Vector3f(0, 0, 0)), pen);
+  const auto write = [&](const std::vector<std::vector<Eigen::Vector2f>>& lines, const Vector3f& colour, double width) {
+    for (const auto& line : lines) stroke(placed(line), colour, width);
+  };
+  const double pen = std::max(1.1, 0.12 * item.size);
+  const Vector3f ink = paint.fill.value_or(Vector3f(0, 0, 0));
+  if (paint.halo) {
+    write(shape.strokes, Vector3f(1, 1, 1), pen + 2.4);
+    write(shape.outlines, Vector3f(1, 1, 1), 2.4);
+  }
+  write(shape.strokes, ink, pen);
+  std::vector<Points> filled;
+  for (const auto& outline : shape.outlines) filled.push_back(placed(outline));
+  fill_polygons(image_, filled, ink);
 }
 
 void Painter::draw(const SvgItem& item) {
@@ -286,7 +224,7 @@ void Painter::draw(const SvgItem& item) {
   } else {
     path = read_path(item.words);
   }
-  if (paint.fill) fill(path.lines, *paint.fill, paint.opacity, paint.even_odd);
+  if (paint.fill) fill_polygons(image_, path.lines, *paint.fill, paint.opacity, paint.even_odd);
   if (!paint.stroke) return;
   for (std::size_t k = 0; k < path.lines.size(); ++k) {
     if (path.closed[k] && !path.lines[k].empty()) path.lines[k].push_back(path.lines[k].front());

@@ -55,7 +55,7 @@ until = "0.8 s"
 
 [output]
 every = "1/30 s"
-formats = ["vtu"]                             # also "iges", "obj"
+formats = ["vtu"]                             # also "iges", "obj", "glb", ...
 )";
 }
 

@@ -14,21 +14,6 @@
 namespace toile {
 namespace {
 
-int edit_distance(std::string_view a, std::string_view b) {
-  std::vector<int> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = static_cast<int>(j);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    int diagonal = row[0];
-    row[0] = static_cast<int>(i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const int replaced = diagonal + (a[i - 1] != b[j - 1]);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row[b.size()];
-}
-
 std::string expected(const Dimension& dimension) {
   return dimension == dimension::none ? "a number" : fmt::format("a number in {}", unit_name(dimension));
 }
@@ -65,20 +50,6 @@ toml::table parse_toml(std::string_view text, const std::filesystem::path& path)
   } catch (const toml::parse_error& error) {
     throw InputError(fmt::format("{}:{}: {}", path.string(), error.source().begin.line, error.description()));
   }
-}
-
-std::string suggestion(std::string_view word, const std::vector<std::string>& possible) {
-  const std::string* best = nullptr;
-  int distance = std::max(2, static_cast<int>(word.size()) / 3);
-  for (const std::string& p : possible) {
-    const int d = edit_distance(word, p);
-    if (d <= distance && (!best || d < distance)) {
-      best = &p;
-      distance = d;
-    }
-  }
-  if (best) return fmt::format("; did you mean '{}'?", *best);
-  return fmt::format("; possible are {}", fmt::join(possible, ", "));
 }
 
 const char* type_name(const toml::node& node) {
@@ -146,9 +117,34 @@ std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml:
   return result;
 }
 
-const toml::node* Table::find(const std::string& key) {
-  known_.push_back(key);
-  return table_.get(key);
+namespace {
+thread_local KeyRecording* recording = nullptr;
+}
+
+KeyRecording::KeyRecording() {
+  recording = this;
+}
+
+KeyRecording::~KeyRecording() {
+  recording = nullptr;
+}
+
+void KeyRecording::take(const AskedKey& key) {
+  const auto same = [&](const AskedKey& k) { return k.table == key.table && k.key == key.key; };
+  const auto known = std::ranges::find_if(keys_, same);
+  if (known == keys_.end()) {
+    keys_.push_back(key);
+  } else if (known->kind == AskedKey::Kind::any) {
+    *known = key;
+  }
+}
+
+const toml::node* Table::ask(AskedKey key) {
+  if (std::ranges::find(known_, key.key) == known_.end()) known_.push_back(key.key);
+  const toml::node* node = table_.get(key.key);
+  key.table = name_;
+  if (recording) recording->take(key);
+  return node;
 }
 
 std::string Table::place(const toml::node& node) const {
@@ -190,14 +186,15 @@ double Table::quantity(const toml::node& node, const std::string& what, const Di
 }
 
 std::optional<double> Table::number(const std::string& key, const Dimension& dimension, Range range, double bare_unit) {
-  const toml::node* node = find(key);
+  const toml::node* node = ask({.kind = AskedKey::Kind::number, .key = key, .dimension = dimension, .range = range});
   if (!node) return std::nullopt;
   return quantity(*node, label(key), dimension, range, bare_unit);
 }
 
 std::optional<std::vector<double>> Table::numbers(const std::string& key, std::size_t count, const Dimension& dimension,
                                                   double bare_unit) {
-  const toml::node* node = find(key);
+  const toml::node* node =
+      ask({.kind = AskedKey::Kind::vector, .key = key, .dimension = dimension, .count = static_cast<int>(count)});
   if (!node) return std::nullopt;
   const toml::array* array = node->as_array();
   if (!array || array->size() != count) {
@@ -212,7 +209,7 @@ std::optional<std::vector<double>> Table::numbers(const std::string& key, std::s
 }
 
 std::optional<int> Table::integer(const std::string& key, int least, int most) {
-  const toml::node* node = find(key);
+  const toml::node* node = ask({.kind = AskedKey::Kind::integer, .key = key, .least = least, .most = most});
   if (!node) return std::nullopt;
   return integer(*node, label(key), least, most);
 }
@@ -225,7 +222,7 @@ int Table::integer(const toml::node& node, const std::string& what, int least, i
 }
 
 std::optional<std::array<int, 2>> Table::integers(const std::string& key, int least, int most) {
-  const toml::node* node = find(key);
+  const toml::node* node = ask({.kind = AskedKey::Kind::integers, .key = key, .least = least, .most = most});
   if (!node) return std::nullopt;
   const toml::array* array = node->as_array();
   if (!array || array->size() != 2) fail(*node, fmt::format("{} must be two whole numbers [u, v]", label(key)));
@@ -234,14 +231,14 @@ std::optional<std::array<int, 2>> Table::integers(const std::string& key, int le
 }
 
 std::optional<std::string> Table::string(const std::string& key) {
-  const toml::node* node = find(key);
+  const toml::node* node = ask({.kind = AskedKey::Kind::string, .key = key});
   if (!node) return std::nullopt;
   if (!node->is_string()) fail(*node, fmt::format("{} must be a string, not {}", label(key), type_name(*node)));
   return *node->value<std::string>();
 }
 
 std::optional<bool> Table::boolean(const std::string& key) {
-  const toml::node* node = find(key);
+  const toml::node* node = ask({.kind = AskedKey::Kind::boolean, .key = key});
   if (!node) return std::nullopt;
   if (!node->is_boolean()) fail(*node, fmt::format("{} must be true or false, not {}", label(key), type_name(*node)));
   return *node->value<bool>();
@@ -249,6 +246,7 @@ std::optional<bool> Table::boolean(const std::string& key) {
 
 std::optional<std::string> Table::choice(const std::string& key, const std::vector<std::string>& now,
                                          const std::vector<std::string>& later) {
+  ask({.kind = AskedKey::Kind::choice, .key = key, .choices = now});
   const auto value = string(key);
   if (!value) return std::nullopt;
   const toml::node& node = *table_.get(key);
@@ -263,7 +261,7 @@ std::optional<std::string> Table::choice(const std::string& key, const std::vect
 }
 
 std::optional<Table> Table::table(const std::string& key, const std::string& name) {
-  const toml::node* node = find(key);
+  const toml::node* node = ask({.kind = AskedKey::Kind::table, .key = key, .child = name});
   if (!node) return std::nullopt;
   return as_table(*node, name);
 }
@@ -274,7 +272,7 @@ Table Table::as_table(const toml::node& node, const std::string& name) const {
 }
 
 std::vector<Table> Table::tables(const std::string& key, const std::string& name) {
-  const toml::node* node = find(key);
+  const toml::node* node = ask({.kind = AskedKey::Kind::tables, .key = key, .child = name});
   if (!node) return {};
   const toml::array* array = node->as_array();
   if (!array) fail(*node, fmt::format("{} must be an array of tables: write {}", key, name));
@@ -284,9 +282,7 @@ std::vector<Table> Table::tables(const std::string& key, const std::string& name
 }
 
 void Table::refuse(const std::string& key, const std::string& why) {
-  const toml::node* node = find(key);
-  known_.pop_back();
-  if (node) fail(*node, why);
+  if (const toml::node* node = table_.get(key)) fail(*node, why);
 }
 
 void Table::done() const {

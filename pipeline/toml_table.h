@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "geometry/error.h"
+#include "pipeline/suggestion.h"
 #include "pipeline/units.h"
 
 namespace toile {
@@ -33,9 +34,6 @@ void refuse_deep_keys(std::string_view text, const std::string& file);
 // Throws InputError `file:line: what` where the text is no TOML.
 toml::table parse_toml(std::string_view text, const std::filesystem::path& path);
 
-// "; did you mean 'grain_deg'?", or the list of what is possible.
-std::string suggestion(std::string_view word, const std::vector<std::string>& possible);
-
 // "a table", "a string", ...
 const char* type_name(const toml::node& node);
 
@@ -47,6 +45,35 @@ std::vector<std::pair<std::string, const toml::node*>> in_file_order(const toml:
 
 enum class Range { any, nonnegative, positive };
 
+// What a reader asks of a key: the description that a schema is made of.
+struct AskedKey {
+  enum class Kind { any, number, vector, integer, integers, string, boolean, choice, table, tables };
+  Kind kind = Kind::any;
+  std::string table = {};  // its name, as errors give it ("[[panel]]")
+  std::string key = {};
+  Dimension dimension = dimension::none;
+  Range range = Range::any;
+  int count = 0;            // entries of a vector
+  int least = 0, most = 0;  // whole numbers
+  std::vector<std::string> choices = {};
+  std::string child = {};  // name of the table or of each of the tables
+};
+
+// While one lives, every key that a Table of this thread is asked for is listed, in order and once.
+class KeyRecording {
+ public:
+  KeyRecording();
+  ~KeyRecording();
+  KeyRecording(const KeyRecording&) = delete;
+  KeyRecording& operator=(const KeyRecording&) = delete;
+  const std::vector<AskedKey>& keys() const { return keys_; }
+
+ private:
+  friend class Table;
+  void take(const AskedKey& key);
+  std::vector<AskedKey> keys_;
+};
+
 // Keys of one table, each asked for by name. Getters return nothing (or leave the target) where the key is missing and
 // throw InputError `file:line: ...` where its value is of another kind; `done` throws UnknownKeyError for a key that
 // nobody asked for.
@@ -55,7 +82,7 @@ class Table {
   Table(const toml::table& table, std::string name, std::string file)
       : table_(table), name_(std::move(name)), file_(std::move(file)) {}
 
-  const toml::node* find(const std::string& key);
+  const toml::node* find(const std::string& key) { return ask({.key = key}); }
 
   std::string place(const toml::node& node) const;  // "scene.toml:12"
   std::string where() const { return place(table_); }
@@ -94,6 +121,7 @@ class Table {
   void done() const;
 
  private:
+  const toml::node* ask(AskedKey key);
   std::optional<std::vector<double>> numbers(const std::string& key, std::size_t count, const Dimension& dimension,
                                              double bare_unit);
 

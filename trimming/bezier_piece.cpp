@@ -29,6 +29,13 @@ bool apart(const Box& a, const Box& b) {
   return a.max.x() < b.min.x() || b.max.x() < a.min.x() || a.max.y() < b.min.y() || b.max.y() < a.min.y();
 }
 
+// Where on a straight piece the place at a share of its length lies: the weights of the ends move the parameter.
+double parameter_of(const BezierPiece& piece, double share) {
+  if (!piece.straight()) return share;
+  const double from = (1 - share) * piece.span.w[1], to = share * piece.span.w[0];
+  return to / (from + to);
+}
+
 // A part of a piece with its parameters on that.
 struct Stretch {
   BezierPiece piece;
@@ -93,8 +100,9 @@ class Crossings {
     // Ends of stretches count for both neighbours.
     const double slack_a = flat_ / std::max(da.norm(), flat_), slack_b = flat_ / std::max(db.norm(), flat_);
     if (s < -slack_a || s > 1 + slack_a || t < -slack_b || t > 1 + slack_b) return;
-    const Vector2d start(std::clamp(a.x0 + (a.x1 - a.x0) * s, 0.0, 1.0),
-                         std::clamp(b.x0 + (b.x1 - b.x0) * t, 0.0, 1.0));
+    const double x0 = parameter_of(a.piece, std::clamp(s, 0.0, 1.0)),
+                 y0 = parameter_of(b.piece, std::clamp(t, 0.0, 1.0));
+    const Vector2d start(a.x0 + (a.x1 - a.x0) * x0, b.x0 + (b.x1 - b.x0) * y0);
     const Vector2d x = polished(a_, b_, start, 2 * std::max(a.x1 - a.x0, b.x1 - b.x0));
     each_(x[0], x[1]);
   }
@@ -190,12 +198,10 @@ bool chord_parts(const BezierPiece& a, const BezierPiece& b, double margin) {
 
 std::pair<double, double> nearest(const BezierPiece& piece, const Vector2d& x) {
   if (piece.straight()) {
-    // By the share of the length; the weights of the ends move the parameter.
     const Vector2d d = piece.last() - piece.first();
     const double length = d.squaredNorm();
     const double share = length > 0 ? std::clamp((x - piece.first()).dot(d) / length, 0.0, 1.0) : 0;
-    const double from = (1 - share) * piece.span.w[1], to = share * piece.span.w[0];
-    return {to / (from + to), (piece.first() + share * d - x).norm()};
+    return {parameter_of(piece, share), (piece.first() + share * d - x).norm()};
   }
   const auto off = [&](double s) { return (piece.at(s) - x).squaredNorm(); };
   const int parts = 4 * piece.degree();

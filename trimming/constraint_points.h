@@ -1,5 +1,5 @@
 // The points at which strain is limited: knot-mesh vertices in the material and the meetings of trims with knot lines
-// [Peng & Zheng 2022, 3.4, Fig. 3]. The contract is in design.md, "The command line".
+// [Peng & Zheng 2022, 3.4, Fig. 3].
 #pragma once
 
 #include <string>

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "geometry/finite.h"
 #include "trimming/topology.h"
 #include "trimming/winding.h"
 
@@ -17,6 +18,7 @@ std::pair<int, int> cells_around(double x, const std::vector<double>& lines) {
 }  // namespace
 
 bool contains(const TrimmedSurface& surface, const TrimTopology& topology, const Eigen::Vector2d& uv) {
+  require_finite(uv, "the point asked about");
   const auto [i0, i1] = cells_around(uv.x(), topology.mesh.u);
   const auto [j0, j1] = cells_around(uv.y(), topology.mesh.v);
   bool cut = false;

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "geometry/error.h"
+#include "geometry/finite.h"
 
 namespace toile {
 namespace {
@@ -417,6 +418,13 @@ LineForm::LineForm(const TrimSpan& span, Axis axis, double c) : span_(&span), ax
     b_[i] = span.w[i] * (x[i] - c);
     magnitude_ = std::max(magnitude_, std::abs(b_[i]));
   }
+  require_finite(c, "a line of constant u or v");
+  require_finite(magnitude_, "the distance of a trim from a line of constant u or v");
+}
+
+// A difference and a product, each rounded once.
+double LineForm::coefficient_error() const {
+  return 2.5 * epsilon * magnitude_;
 }
 
 double LineForm::coordinate(int i) const {
@@ -449,6 +457,7 @@ int sign_at(const LineForm& form, double s, PredicateCounts& counts) {
     ++counts.interval;
     return quick;
   }
+  require_finite(s, "a parameter on a trim");
   ++counts.exact;
   std::vector<Dyadic> d = exact_coefficients<Dyadic>(form);
   const Dyadic t(s), r = Dyadic(1) - t;
@@ -471,9 +480,8 @@ std::vector<LineRoot> roots(const LineForm& form, PredicateCounts& counts) {
     ++counts.coefficient_signs;
     if (count == 1) out.push_back({0, 1, true, nullptr});
   } else {
-    const double bound = 2.5 * epsilon * form.magnitude();
-    if (isolate_filtered(form.coefficients(), static_cast<std::size_t>(form.degree()), bound, form.magnitude(), 0, 1,
-                         out)) {
+    if (isolate_filtered(form.coefficients(), static_cast<std::size_t>(form.degree()), form.coefficient_error(),
+                         form.magnitude(), 0, 1, out)) {
       ++counts.interval;
     } else {
       out.clear();
@@ -565,6 +573,8 @@ int orientation(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen:
   const double det = left - right;
   // [Shewchuk 1997, orient2d: (3 + 16 eps) eps]
   if (std::abs(det) > 4 * epsilon * (std::abs(left) + std::abs(right))) return sign_of(det);
+  // What isn't finite makes one of the products infinite or no number, and comes here.
+  for (const Eigen::Vector2d* x : {&a, &b, &c}) require_finite(*x, "a point of a triangle");
   return sign_of((Dyadic(b.x()) - Dyadic(a.x())) * (Dyadic(c.y()) - Dyadic(a.y())) -
                  (Dyadic(b.y()) - Dyadic(a.y())) * (Dyadic(c.x()) - Dyadic(a.x())));
 }

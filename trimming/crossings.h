@@ -12,7 +12,7 @@ namespace toile {
 enum class Axis { u, v };
 
 // The numerator of (coordinate - c) along a span: Bernstein coefficients w_i (x_i - c), whose signs are comparisons of
-// the given doubles. The span must outlive the form.
+// the given doubles. The span must outlive the form. Throws GeometryError where c or a coefficient isn't finite.
 class LineForm {
  public:
   LineForm(const TrimSpan& span, Axis axis, double c);
@@ -24,9 +24,10 @@ class LineForm {
   double coordinate(int i) const;
   // Exact sign of coefficient i.
   int coefficient_sign(int i) const;
-  // Coefficients rounded (relative error below 2 eps each), and the largest magnitude of them.
+  // Coefficients rounded, the largest magnitude of them, and how far each may lie from the exact one.
   const std::array<double, max_degree + 1>& coefficients() const { return b_; }
   double magnitude() const { return magnitude_; }
+  double coefficient_error() const;
   bool zero() const { return magnitude_ == 0; }
   // Exact sign just after s = 0 and just before s = 1 (0 for a span on the line).
   int sign_after_start() const;
@@ -67,7 +68,8 @@ int sign_at_root(const LineForm& form, const LineForm& of, LineRoot& root, Predi
 // Exact order (-1, 0, 1) of root a of f and root b of g, both on one span; narrows the roots.
 int compare(const LineForm& f, LineRoot& a, const LineForm& g, LineRoot& b, PredicateCounts& counts);
 
-// Exact sign of the area of the triangle a, b, c: 1 counter-clockwise, 0 on a line.
+// Exact sign of the area of the triangle a, b, c: 1 counter-clockwise, 0 on a line. Throws GeometryError for a corner
+// that isn't finite.
 int orientation(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c);
 
 }  // namespace toile

@@ -16,6 +16,7 @@ struct LoopRepair {
   std::string what;  // "reversed", "closed a gap of 3e-9", "moved into the domain", "snapped to u = 0.5", ...
   double move = 0;   // largest move in the parameter plane
   Eigen::Vector2d place{0, 0};  // where
+  bool note = false;            // says nothing against the file: a direction, or a move of the size of rounding
 };
 
 struct LoopOptions {
@@ -23,7 +24,7 @@ struct LoopOptions {
   // are errors.
   double repair_tolerance = 1e-3;
   // Control points and segment ends nearer than this to a knot line move onto it [length, unit of the net; divided by
-  // |S_u|, |S_v|]. Unset: the surface's resolution. (iges.md, "Curve against knot line", 1)
+  // |S_u|, |S_v|]. Unset: the surface's resolution.
   std::optional<double> snap;
 };
 

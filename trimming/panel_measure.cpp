@@ -181,6 +181,15 @@ double length_adaptive(const NurbsSurface& surface, const Curve2& curve, Interva
   return sum;
 }
 
+// Where each curve of each loop meets knot lines, in one pass.
+std::vector<std::vector<std::vector<double>>> event_parameters(const TrimmedSurface& surface,
+                                                               const TrimTopology& topology) {
+  std::vector<std::vector<std::vector<double>>> out;
+  for (const TrimLoop& loop : surface.loops) out.emplace_back(loop.curves.size());
+  for (const TrimEvent& event : topology.events) out[event.loop][event.curve].push_back(event.t);
+  return out;
+}
+
 }  // namespace
 
 PanelMeasure measure(const TrimmedSurface& surface, const TrimTopology& topology) {
@@ -194,14 +203,14 @@ PanelMeasure measure(const TrimmedSurface& surface, const TrimTopology& topology
             box_area_adaptive(surface.surface, {mesh.u[i], mesh.u[i + 1]}, {mesh.v[j], mesh.v[j + 1]}, 4, density);
   for (const CutCell& cell : topology.cut_cells) result.area += cut_area_adaptive(surface, mesh, cell, density);
 
+  const std::vector<std::vector<std::vector<double>>> events = event_parameters(surface, topology);
   for (int l = 0; l < static_cast<int>(surface.loops.size()); ++l) {
     double length = 0;
     for (int k = 0; k < static_cast<int>(surface.loops[l].curves.size()); ++k) {
       // The speed is smooth between the curve's own knots and the surface's knot lines.
       const Curve2& curve = surface.loops[l].curves[k].curve;
       std::vector<double> breaks = curve.knots().breaks();
-      for (const TrimEvent& event : topology.events)
-        if (event.loop == l && event.curve == k) breaks.push_back(event.t);
+      breaks.insert(breaks.end(), events[l][k].begin(), events[l][k].end());
       std::sort(breaks.begin(), breaks.end());
       std::vector<double> coarse;
       // A curve along a pole has no length: rounding of the places is what its integrals may differ by.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/finite.h"
+
 namespace toile {
 namespace {
 
@@ -142,6 +144,8 @@ std::vector<TrimSpan> trim_spans(const Curve2& curve, int loop, int curve_positi
         span.v[at] = rational ? (h.y / h.w).hi : h.y.hi;
         span.w[at] = h.w.hi;
       }
+      require_finite(span.point(k), "a Bezier point of a trim");
+      require_finite(span.w[at], "a weight of a trim");
     }
     spans.push_back(span);
   }

@@ -14,9 +14,9 @@ namespace toile {
 //   (1) s in [0, 1] maps to t = range.min + s * range.length();
 //   (2) neighbours on one curve share their end point bitwise;
 //   (3) where the curve's knots are Bezier knots already, the points are the curve's own doubles; else they come from
-//   one
-//       extraction in twice the precision, rounded once: control points that share a coordinate give points that share
-//       it.
+//       one extraction in twice the precision, rounded once: control points that share a coordinate give points that
+//       share it;
+//   (4) every number is finite (trim_spans() throws GeometryError where the extraction overflows).
 struct TrimSpan {
   int loop = 0, curve = 0;  // positions in TrimmedSurface::loops and TrimLoop::curves
   Interval range;           // parameters of the curve as given

@@ -74,7 +74,7 @@ struct TrimTopology {
 // The knot lines are those of `surface.surface`.
 TrimTopology trace_trims(const TrimmedSurface& surface);
 
-// Is the parameter point in the material (border included)?
+// Is the parameter point in the material (border included)? Throws GeometryError where it isn't finite.
 bool contains(const TrimmedSurface& surface, const TrimTopology& topology, const Eigen::Vector2d& uv);
 
 }  // namespace toile

@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "geometry/error.h"
+#include "geometry/finite.h"
 #include "trimming/text.h"
 
 namespace toile {
@@ -242,6 +243,7 @@ class Mesher {
       for (const Segment& s : ring) {
         const auto count = delaunay_.number_of_vertices();
         const Vector2d x = plane_ * s.from;
+        require_finite(x, "a vertex of the triangles");
         const Delaunay::Vertex_handle v = delaunay_.insert({x.x(), x.y()}, near);
         if (delaunay_.number_of_vertices() != count) {
           v->info() = static_cast<int>(out_.uv.size());
@@ -376,6 +378,7 @@ class Mesher {
       Delaunay::Face_handle face;
       if (!delaunay_.is_face(task.a, task.b, task.c, face)) continue;
       const Kernel::Point_2 x = delaunay_.circumcenter(face);
+      if (!std::isfinite(x.x()) || !std::isfinite(x.y())) continue;  // of corners on a line but for rounding
       Delaunay::Locate_type type;
       int index = 0;
       const Delaunay::Face_handle at = delaunay_.locate(x, type, index, face);

@@ -1,6 +1,10 @@
 #include "trimming/winding.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
+
+#include "geometry/finite.h"
 
 namespace toile {
 namespace {
@@ -40,6 +44,7 @@ std::optional<int> ray_crossings(const TrimSpan& span, const Eigen::Vector2d& po
 
 std::optional<int> winding_number(std::span<const TrimSpan> spans, const Eigen::Vector2d& point,
                                   PredicateCounts& counts) {
+  require_finite(point, "the point asked about");
   int total = 0;
   for (const TrimSpan& span : spans) {
     const std::optional<int> n = ray_crossings(span, point, counts);
@@ -59,6 +64,31 @@ std::optional<int> winding_number(const std::vector<TrimLoop>& loops, const Trim
     total += curves[c].reversed ? -*n : *n;
   }
   return total;
+}
+
+int winding_around(const std::vector<TrimLoop>& loops, const TrimSpans& spans, int loop, int of,
+                   PredicateCounts& counts) {
+  const auto box = [&](int l) {
+    Eigen::AlignedBox2d b;
+    for (const TrimCurve& c : loops[static_cast<std::size_t>(l)].curves)
+      for (const auto& p : c.curve.points().colwise()) b.extend(p);
+    return b;
+  };
+  if (!box(loop).intersects(box(of))) return 0;
+  for (const TrimSpan& span : spans.of(loop))
+    if (const auto n = winding_number(loops, spans, of, span.first(), counts)) return *n;
+  // Rounding moves a place by 8 eps of its coordinates at most.
+  for (const TrimSpan& span : spans.of(loop)) {
+    for (const double s : {0.5, 0.25, 0.75}) {
+      const Eigen::Vector2d x = span.at(s), d = 8 * std::numeric_limits<double>::epsilon() * x.cwiseAbs();
+      const auto near = [&](double u, double v) {
+        return winding_number(loops, spans, of, x + Eigen::Vector2d(u * d.x(), v * d.y()), counts);
+      };
+      const auto n = near(1, 1);
+      if (n && n == near(-1, -1) && n == near(1, -1) && n == near(-1, 1)) return *n;
+    }
+  }
+  return 0;
 }
 
 }  // namespace toile

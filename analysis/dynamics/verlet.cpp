@@ -26,7 +26,7 @@ void acceleration(const DynamicSystem& system, const Vector& q_force, const Vect
                   double h, Vector& a) {
   a.resize(3 * system.map->nodes());
   system.map->reduce(q_force, a, system.model->workers().get());
-  share_out(system.model->workers().get(), system.map->nodes(), [&](int, int begin, int end) {
+  share_out(system.model->workers().get(), system.map->nodes(), [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       const double m = system.node_mass[k], c = system.node_drag[k];
       const Eigen::Vector3d known = v.segment<3>(3 * k) + h * constraint.segment<3>(3 * k);
@@ -147,8 +147,8 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
       const double mass = system.node_mass[k];
       sums.kinetic += 0.5 * mass * v.squaredNorm();
       sums.drag_work -= system.node_drag[k] * (v - system.loads.wind).dot(move);
-      sums.kick += 0.125 * dt * dt * mass *
-                   std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (a + held).squaredNorm());
+      sums.kick +=
+          0.125 * dt * dt * mass * std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (a + held).squaredNorm());
       v += 0.5 * dt * a;
       if (!system.projection) sums.kinetic_end += 0.5 * mass * v.squaredNorm();
       sums.finite = sums.finite && next.x.segment<3>(3 * k).allFinite() && a.allFinite();

@@ -42,7 +42,7 @@ struct StepReport {
 };
 // In the middle of a step, kinetic + mean of (elastic + limit_energy) at both ends - works up to the step - half the
 // works of the step never rises, up to the order of the scheme: what projection takes is lost, nothing is gained.
-// Masses and drag are the nodes' (design.md, "Numerics").
+// Masses and drag are the nodes'.
 
 // Everything a step needs that doesn't change from step to step. The caller keeps the parts alive.
 struct DynamicSystem {

@@ -121,7 +121,7 @@ class Envelope {
     return true;
   }
 
-  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) const {
+  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) {
     const int n = static_cast<int>(first_.size());
     for (int i = 0; i < n; ++i) {
       const double* row = &factor_[start_[i]] - first_[i];
@@ -215,7 +215,7 @@ class Envelope {
   std::vector<int> order_, first_, start_, slot_;
   std::vector<double> factor_, inverse_;
   std::vector<Pack> rows_;
-  mutable std::vector<double> work_;
+  std::vector<double> work_;
 };
 
 // Order and supernodes, by CHOLMOD and METIS.
@@ -303,7 +303,7 @@ bool Cholesky::factorise(std::span<const double> values) {
                          : impl_->supernodal->factorise(values, impl_->workers.get());
 }
 
-void Cholesky::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) const {
+void Cholesky::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) {
   impl_->envelope ? impl_->envelope->solve(rhs, x) : impl_->supernodal->solve(rhs, x, impl_->workers.get());
 }
 

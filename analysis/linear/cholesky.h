@@ -26,7 +26,8 @@ class Cholesky {
 
   // Values in the order of the pattern. False where a pivot is not positive; the factor is then unusable.
   bool factorise(std::span<const double> values);
-  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) const;
+  // Not const: it works in memory of the factor's own, so one call at a time.
+  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x);
   // What supernodes do is dealt out to these, with the same bits.
   void use_threads(std::shared_ptr<Workers> workers);
   std::size_t factor_nonzeros() const;

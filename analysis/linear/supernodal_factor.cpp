@@ -184,7 +184,7 @@ bool SupernodalFactor::eliminate(Part& part, Node& node, std::span<const double>
   Dense update(part.front.data(), below, below, Eigen::OuterStride<>(below));
   diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(under);
   const int blocks = (below + block - 1) / block;
-  share_out(below >= wide ? workers : nullptr, blocks, [&](int, int begin, int end) {
+  share_out(below >= wide ? workers : nullptr, blocks, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       const int from = block * k, width = std::min(block, below - from), left = below - from;
       update.block(from, from, left, width).noalias() -=
@@ -204,7 +204,7 @@ bool SupernodalFactor::factorise(std::span<const double> values, Workers* worker
         return;
       }
   };
-  share_out(workers, group_count, [&](int, int begin, int end) {
+  share_out(workers, group_count, [&](int begin, int end) {
     for (int g = begin; g < end; ++g) eliminate_all(groups_[g], nullptr);
   });
   for (const Part& part : groups_)
@@ -214,7 +214,7 @@ bool SupernodalFactor::factorise(std::span<const double> values, Workers* worker
 }
 
 // x = L_ss^-1 of the node's part of the vector; the rows below take L x from theirs.
-void SupernodalFactor::forward(const Node& node, double* scratch) const {
+void SupernodalFactor::forward(const Node& node, double* scratch) {
   const int rows = node.rows;
   double* const own = work_.data() + node.column;
   std::copy_n(own, node.columns, scratch);
@@ -243,7 +243,7 @@ void SupernodalFactor::forward(const Node& node, double* scratch) const {
 }
 
 // The node's part of the vector, once that of the rows below is known.
-void SupernodalFactor::backward(const Node& node, double* scratch) const {
+void SupernodalFactor::backward(const Node& node, double* scratch) {
   const int rows = node.rows;
   double* const own = work_.data() + node.column;
   const int* const row = row_.data() + node.first_row;
@@ -280,11 +280,11 @@ void SupernodalFactor::backward(const Node& node, double* scratch) const {
 }
 
 void SupernodalFactor::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x,
-                             Workers* workers) const {
+                             Workers* workers) {
   const std::size_t n = order_.size(), top = top_columns_.size();
   for (std::size_t k = 0; k < n; ++k) work_[k] = rhs[order_[k]];
   std::fill(work_.begin() + static_cast<std::ptrdiff_t>(n), work_.end(), 0.0);
-  share_out(workers, group_count, [&](int, int begin, int end) {
+  share_out(workers, group_count, [&](int begin, int end) {
     for (int g = begin; g < end; ++g)
       for (const int s : groups_[g].nodes) forward(nodes_[s], groups_[g].column.data());
   });
@@ -292,7 +292,7 @@ void SupernodalFactor::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen
     for (std::size_t k = 0; k < top; ++k) work_[top_columns_[k]] += work_[n + g * top + k];
   for (const int s : top_.nodes) forward(nodes_[s], top_.column.data());
   for (std::size_t k = top_.nodes.size(); k-- > 0;) backward(nodes_[top_.nodes[k]], top_.column.data());
-  share_out(workers, group_count, [&](int, int begin, int end) {
+  share_out(workers, group_count, [&](int begin, int end) {
     for (int g = begin; g < end; ++g)
       for (std::size_t k = groups_[g].nodes.size(); k-- > 0;)
         backward(nodes_[groups_[g].nodes[k]], groups_[g].column.data());

@@ -25,7 +25,7 @@ class SupernodalFactor {
 
   // False where a pivot is not positive.
   bool factorise(std::span<const double> values, Workers* workers);
-  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x, Workers* workers) const;
+  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x, Workers* workers);
 
  private:
   struct Node {
@@ -53,20 +53,20 @@ class SupernodalFactor {
   void lay_out_stack(Part& part);
   bool eliminate(Part& part, Node& node, std::span<const double> values, Workers* workers);
   void add_update(const Node& child, const Node& node, double* front);
-  void forward(const Node& node, double* scratch) const;
-  void backward(const Node& node, double* scratch) const;
+  void forward(const Node& node, double* scratch);
+  void backward(const Node& node, double* scratch);
   Part& part_of(const Node& node) { return node.group < 0 ? top_ : groups_[static_cast<std::size_t>(node.group)]; }
 
   std::vector<Node> nodes_;
-  mutable std::vector<Part> groups_;  // of whole subtrees
-  mutable Part top_;
+  std::vector<Part> groups_;  // of whole subtrees
+  Part top_;
   std::vector<int> top_columns_;
   std::vector<int> row_, relative_;  // relative_: which row of the parent it is
   std::vector<int> target_;          // where in work_ what a row takes is summed
   std::vector<int> order_;
   std::vector<Entry> entries_;
   std::vector<double> factor_;
-  mutable std::vector<double> work_;  // the vector, then what each group takes from the top's columns
+  std::vector<double> work_;  // the vector, then what each group takes from the top's columns
 };
 
 }  // namespace toile

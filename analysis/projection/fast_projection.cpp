@@ -68,9 +68,9 @@ struct FastProjection::Impl {
   Eigen::VectorXd share;                      // of the force at the end in what acts in a step
   std::vector<char> slack;                    // within the band without a force: takes no part for now
   Eigen::Matrix3Xd place_lambda, strain_impulse;
-  Eigen::Matrix3Xd impulse;      // per scalar row, of one push
-  Eigen::VectorXd row_energy;    // per strain row
-  std::vector<Violation> parts;  // per thread
+  Eigen::Matrix3Xd impulse;    // per scalar row, of one push
+  Eigen::VectorXd row_energy;  // per strain row
+  std::vector<Violation> worst_of_piece;
 
   Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
       : map(m), rows(std::move(r)), options(o), composed(compose(map, rows)) {}
@@ -87,7 +87,7 @@ struct FastProjection::Impl {
   LimitLaw force_law(int r) const { return {band(r), 1 / stiffness[r]}; }
   double strain(const Eigen::Matrix3Xd& tangent, int r) const { return 0.5 * (tangent.col(r).squaredNorm() - 1); }
   double limit_energy() {
-    share_out(strains(), [&](int, int begin, int end) {
+    share_out(strains(), [&](int begin, int end) {
       for (int r = begin; r < end; ++r) row_energy[r] = has_law(r) ? force_law(r).energy(strain(y, r)) : 0;
     });
     double sum = 0;
@@ -179,7 +179,7 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   strain_impulse = Eigen::Matrix3Xd::Zero(3, strains());
   impulse.resize(3, scalars);
   row_energy.resize(strains());
-  parts.resize(1);
+  worst_of_piece.resize(static_cast<std::size_t>(pieces(strains())));
 }
 
 void FastProjection::Impl::begin(double t) {
@@ -230,15 +230,14 @@ Violation FastProjection::Impl::measure_strain(int begin, int end) {
 }
 
 void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
-  std::fill(parts.begin(), parts.end(), Violation());
-  share_out(strains(), [&](int part, int begin, int end) {
+  share_pieces(workers.get(), strains(), [&](int index, int begin, int end) {
     evaluate(composed, x, fixed_places, begin, end, y);
-    parts[static_cast<std::size_t>(part)] = measure_strain(begin, end);
+    worst_of_piece[static_cast<std::size_t>(index)] = measure_strain(begin, end);
   });
   Violation worst;
-  for (const Violation& part : parts) {
-    worst.take(part.violation, part.row);
-    worst.residual = std::max(worst.residual, part.residual);
+  for (const Violation& piece : worst_of_piece) {
+    worst.take(piece.violation, piece.row);
+    worst.residual = std::max(worst.residual, piece.residual);
   }
   report.strain_violation = worst.violation;
   report.worst_row = worst.row;
@@ -255,7 +254,7 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
 }
 
 void FastProjection::Impl::point_along(const Eigen::Matrix3Xd& along) {
-  share_out(strains(), [&](int, int begin, int end) {
+  share_out(strains(), [&](int begin, int end) {
     for (int r = begin; r < end; ++r) {
       const double length = std::max(along.col(r).norm(), shortest_tangent);
       scale[r] = takes_part(r) ? 1 / (std::sqrt(gram_diagonal[r]) * length) : 0;
@@ -270,7 +269,7 @@ void FastProjection::Impl::point_along(const Eigen::Matrix3Xd& along) {
 
 bool FastProjection::Impl::factorise(ProjectionReport& report) {
   const double* t = direction.data();
-  share_out(size(), [&](int, int begin, int end) {
+  share_out(size(), [&](int begin, int end) {
     for (int c = begin; c < end; ++c) {
       const bool idle = c < strains() && slack[c];
       const double t0 = t[3 * c], t1 = t[3 * c + 1], t2 = t[3 * c + 2];
@@ -285,7 +284,7 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
   // factor fails without it.
   double strain_softness = options.regularisation, place_softness = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
-    share_out(size(), [&](int, int begin, int end) {
+    share_out(size(), [&](int begin, int end) {
       for (int i = begin; i < end; ++i) {
         double softness = i < strains() ? strain_softness : place_softness;
         if (i < strains() && soft(i))
@@ -305,7 +304,7 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
 
 // x -= M^-1 J^T amounts, for amounts of scaled rows.
 void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x) {
-  share_out(strains(), [&](int, int begin, int end) {
+  share_out(strains(), [&](int begin, int end) {
     for (int r = begin; r < end; ++r) {
       impulse.col(r) = amounts[r] * direction.col(r);
       strain_lambda[r] += scale[r] * amounts[r];
@@ -318,7 +317,7 @@ void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen
     place_lambda(k, p) += impulse(k, strains() + p);
   }
   // Node by node, so that a thread writes what no other does.
-  share_out(map.nodes(), [&](int, int begin, int end) {
+  share_out(map.nodes(), [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       double s0 = 0, s1 = 0, s2 = 0;
       for (int e = at_node.start[k]; e < at_node.start[k + 1]; ++e) {
@@ -333,7 +332,7 @@ void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen
 }
 
 void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report) {
-  share_out(size(), [&](int, int begin, int end) {
+  share_out(size(), [&](int begin, int end) {
     for (int i = begin; i < end; ++i) rhs[i] = scale[i] * residual[i];
   });
   const Clock::time_point start = Clock::now();
@@ -407,7 +406,7 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   if (s.options.variant == ProjectionVariant::paper) return project(x, t);
   s.map.fixed_places(t - dt, s.fixed_places);
   s.share_out(s.strains() + s.places(),
-              [&](int, int begin, int end) { evaluate(s.composed, start, s.fixed_places, begin, end, s.tangents); });
+              [&](int begin, int end) { evaluate(s.composed, start, s.fixed_places, begin, end, s.tangents); });
   s.begin(t);
   s.point_along(s.tangents);
   s.complete(forces);
@@ -416,7 +415,7 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   s.candidate = x;
   // What the steps before are owed, and as a first guess that the forces stay as they are. Multipliers are what the
   // end of the step adds.
-  s.share_out(s.strains(), [&](int, int begin, int end) {
+  s.share_out(s.strains(), [&](int begin, int end) {
     for (int r = begin; r < end; ++r) {
       s.rhs[r] = 0;
       if (!s.has_law(r)) continue;
@@ -430,7 +429,7 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   for (int i = s.strains(); i < s.size(); ++i)
     s.rhs[i] = dt2 * forces.place((i - s.strains()) % 3, (i - s.strains()) / 3) / s.scale[i];
   s.push(s.rhs, x);
-  s.share_out(s.strains(), [&](int, int begin, int end) {
+  s.share_out(s.strains(), [&](int begin, int end) {
     for (int r = begin; r < end; ++r) s.strain_lambda[r] = s.soft(r) ? s.share[r] * dt2 * forces.strain(0, r) : 0;
   });
   ProjectionReport report = s.iterate(x, Impl::Directions::start);
@@ -450,7 +449,7 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
     report.factor_seconds = factor_seconds;
     report.solve_seconds = solve_seconds;
   }
-  s.share_out(s.strains(), [&](int, int begin, int end) {
+  s.share_out(s.strains(), [&](int begin, int end) {
     for (int r = begin; r < end; ++r) {
       s.strain_lambda[r] /= s.share[r];
       forces.strain(2, r) = forces.strain(1, r);
@@ -463,7 +462,6 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
 }
 
 void FastProjection::use_threads(std::shared_ptr<Workers> workers) {
-  impl_->parts.assign(workers ? static_cast<std::size_t>(workers->count()) : 1, {});
   if (impl_->factor) impl_->factor->use_threads(workers);
   impl_->workers = std::move(workers);
 }

@@ -63,6 +63,7 @@ void snap(std::vector<double>& lines, const std::vector<double>& breaks) {
 // Greville abscissae of the splines of degree p - `lower`. Where two meet, each for one side of a C0 line or of a seam,
 // the earlier one is moved half of its way back.
 std::vector<double> greville_lines(const KnotVector& knots, int lower, bool closed) {
+  if (knots.degree() <= lower) return gauss_lines(knots, 1);  // of piecewise constants: the middle of every span
   const Interval domain = knots.domain();
   std::vector<double> lines;
   for (int i = lower; i < knots.control_point_count(); ++i) {

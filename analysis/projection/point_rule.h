@@ -27,7 +27,7 @@ enum class PointRule {
   greville,   // the Greville abscissae of both directions
   // The Greville abscissae of the derivatives' splines, one degree lower: one line less per direction than control
   // points. At p = 2 they are the knot lines; beside C0 lines and seams of closed surfaces, where two meet, one is
-  // moved into the span before.
+  // moved into the span before. At p = 1 they are the middles of the spans.
   greville_derivative,
   gauss_1,       // the middle of every cell
   gauss_2x2,     // four Gauss points in every cell

@@ -366,17 +366,20 @@ std::pair<int, int> tensor_shape(const ShellPanel& panel, const CellRule& cell) 
   return along_u * along_v == cell.count ? std::pair(along_u, along_v) : std::pair(0, 0);
 }
 
-// Groups dealt out to threads, a run of groups to each. Control points of one thread's groups alone are summed in
+// Groups shared by threads, in parts of consecutive groups. Control points of one part's groups alone are summed in
 // place; for the others every addend is kept, and added after all are there, in the order of the groups. So each sum is
 // that of one thread going through all groups.
 struct SharedWork {
+  // A thread that comes late still finds work; with more parts, more control points are touched by two.
+  static constexpr int parts_per_thread = 2;
   struct Part {
     std::size_t begin = 0, end = 0;  // groups
     std::vector<int> point;          // control point of each addend that is kept, in order
     std::vector<double> addend;      // 3 each
   };
   explicit SharedWork(int threads)
-      : workers(std::make_shared<Workers>(threads)), parts(static_cast<std::size_t>(workers->count())) {}
+      : workers(std::make_shared<Workers>(threads)),
+        parts(static_cast<std::size_t>(parts_per_thread * workers->count())) {}
   std::shared_ptr<Workers> workers;
   std::vector<Part> parts;
   std::vector<char> shared;                // per control point
@@ -452,7 +455,7 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& i
       });
     }
   };
-  w.workers->run(body);
+  w.workers->run(static_cast<int>(w.parts.size()), body);
   for (const SharedWork::Part& part : w.parts)
     for (std::size_t k = 0; k < part.point.size(); ++k)
       subtract(out, part.point[k], part.addend[3 * k], part.addend[3 * k + 1], part.addend[3 * k + 2]);
@@ -464,7 +467,7 @@ void ShellModel::Impl::share(int threads) {
   work.reset();
   if (threads < 2 || point_count < least_points_for_threads) return;
   work = std::make_unique<SharedWork>(threads);
-  threads = work->workers->count();
+  const int parts = static_cast<int>(work->parts.size());
   work->energy.resize(groups.size());
   const auto cost = [&](const CellGroup& group) {
     return static_cast<double>(group.points) * layouts[group.panel].functions();
@@ -475,10 +478,10 @@ void ShellModel::Impl::share(int threads) {
   std::vector<int> owner(static_cast<std::size_t>(first.back()), -1);
   work->shared.assign(owner.size(), 0);
   const LocalNet none{};
-  for (int p = 0; p < threads; ++p) {
+  for (int p = 0; p < parts; ++p) {
     SharedWork::Part& part = work->parts[static_cast<std::size_t>(p)];
     part.begin = next;
-    for (; next < groups.size() && (p + 1 == threads || before < total * (p + 1) / threads); ++next) {
+    for (; next < groups.size() && (p + 1 == parts || before < total * (p + 1) / parts); ++next) {
       before += cost(groups[next]);
       scatter(groups[next], layouts[groups[next].panel], none, [&](int point, double, double, double) {
         if (owner[point] >= 0 && owner[point] != p) work->shared[point] = 1;

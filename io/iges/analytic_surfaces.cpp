@@ -148,6 +148,7 @@ FileSurface to_surface(const Analytic& s, const Frame& f, Interval height) {
   out.surface = transposed(revolved(profile, f.origin, f.z, {0, 2 * pi}));
   // The standard counts degrees, and a cone's second parameter along its axis; exporters use radians and the slant too.
   out.maps.clear();
+  out.degrees_or_radians = true;
   const AxisMap turn{1, 0, {{{0, 2 * pi}, 4, 2 * pi}}}, along{1, 0, profile_turns};
   for (const double cosine : slant == 1 ? std::vector<double>{1} : std::vector<double>{1, slant})
     for (const double unit : {degree, 1.0}) {

@@ -1,4 +1,4 @@
-// Entities 124 (transformation), 212 (general note), 314 (colour), 406 form 15 (name).
+// Entities 124 (transformation), 212 (general note), 314 (colour), 406 forms 3 (what a level holds) and 15 (name).
 // [IGES 5.3, 4.21, 4.60, 4.77, 4.98]
 #include <numbers>
 
@@ -73,6 +73,10 @@ std::optional<std::string> read_name(Parameters& in) {
 
 void write_name(const std::string& name, Record& out) {
   out.integer(1).string(name);
+}
+
+void write_level_function(const std::string& words, Record& out) {
+  out.integer(2).integer(0).string(words);
 }
 
 }  // namespace toile::iges

@@ -1,8 +1,10 @@
 #include "io/iges/cards.h"
 
 #include <charconv>
+#include <cmath>
 
 #include "geometry/error.h"
+#include "geometry/text.h"
 
 namespace toile::iges {
 
@@ -54,8 +56,33 @@ std::array<std::string, 2> make_cards(const Card& card) {
   put_number(out[1], 8, 8, 0);
   put_number(out[1], 16, 8, card.colour);
   put_number(out[1], 32, 8, card.form);
+  const std::string_view label(card.label);
+  out[1].replace(64 - label.size(), label.size(), label);
   put_number(out[1], 64, 8, 0);
   return out;
+}
+
+constexpr std::string_view up_words = "Up in these axes:";
+
+std::string up_line(const Eigen::Vector3d& up) {
+  std::string out(up_words);
+  for (const double value : up) out += ' ' + text(value);
+  return out;
+}
+
+std::optional<Eigen::Vector3d> read_up(const std::vector<std::string_view>& start) {
+  for (const std::string_view line : start) {
+    if (!line.starts_with(up_words)) continue;
+    Eigen::Vector3d up = Eigen::Vector3d::Zero();
+    const char* at = line.data() + up_words.size();
+    const char* const end = line.data() + line.size();
+    for (double& value : up) {
+      while (at < end && *at == ' ') ++at;
+      at = std::from_chars(at, end, value).ptr;
+    }
+    if (std::abs(up.norm() - 1) < 1e-6) return up;
+  }
+  return std::nullopt;
 }
 
 std::string assemble(const std::vector<std::string>& start, std::string_view global,

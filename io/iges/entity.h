@@ -84,8 +84,13 @@ struct PowerSpline {
 };
 PowerSpline read_power_spline(Parameters& in);
 void write(const PowerSpline& spline, Record& out);
-// Over the breakpoints' range, with every breakpoint a knot as often as the degree. GeometryError where it jumps.
-Curve3 to_curve(const PowerSpline& spline);
+// Over the breakpoints' range, with every breakpoint a knot as often as the degree. Jumps up to `tolerance`, and up to
+// 1e-6 of the size in any case, are closed; `gap` is the largest. GeometryError where it jumps further.
+struct JoinedCurve {
+  Curve3 curve;
+  double gap = 0;
+};
+JoinedCurve to_curve(const PowerSpline& spline, double tolerance);
 
 // 114, alike: 48 coefficients a patch (x, y, z: 16 each, powers of s fastest), patches v fastest with one more row and
 // column than there are spans.
@@ -95,7 +100,11 @@ struct PowerSurface {
 };
 PowerSurface read_power_surface(Parameters& in);
 void write(const PowerSurface& surface, Record& out);
-NurbsSurface to_surface(const PowerSurface& surface);
+struct JoinedSurface {
+  NurbsSurface surface;
+  double gap = 0;
+};
+JoinedSurface to_surface(const PowerSurface& surface, double tolerance);
 
 // 212: the strings of a general note, each where it begins. [IGES 5.3, 4.60]
 struct NoteString {
@@ -122,11 +131,12 @@ struct Boundary {
 Boundary read_boundary(Parameters& in);
 void write(const Boundary& boundary, Record& out);
 
-// 144. An outer pointer counts even where the file says that the outer boundary is the domain's (N1 = 0).
+// 144. An outer pointer counts even where the file says that the outer boundary is the domain's (N1 = 0); where it
+// promises one (N1 = 1) and names none, the domain's border is meant.
 struct Face {
   int surface = 0;
   int outer = 0;  // 0: the border of the surface's domain
-  bool outer_was_denied = false;
+  bool outer_was_denied = false, outer_is_missing = false;
   std::vector<int> holes;
 };
 Face read_face(Parameters& in);
@@ -143,6 +153,8 @@ void write(const Colour& colour, Record& out);
 // 406 form 15; nullopt for other forms.
 std::optional<std::string> read_name(Parameters& in);
 void write_name(const std::string& name, Record& out);
+// 406 form 3: what its level holds.
+void write_level_function(const std::string& words, Record& out);
 
 // What the dispatch table knows of an entity type.
 struct Kind {

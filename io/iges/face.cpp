@@ -2,34 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "geometry/error.h"
+#include "io/iges/entity.h"
 #include "io/iges/loop_curves.h"
+#include "io/iges/parameter_reading.h"
 #include "io/iges/seams.h"
+#include "trimming/loop_closing.h"
+#include "trimming/material.h"
 
 namespace toile::iges {
 
 namespace {
 
 using Eigen::Vector2d;
-
-double signed_area(const std::vector<Vector2d>& p) {
-  double sum = 0;
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    const Vector2d &a = p[i] - p[0], &b = p[(i + 1) % p.size()] - p[0];
-    sum += a.x() * b.y() - a.y() * b.x();
-  }
-  return sum / 2;
-}
-
-bool contains(const std::vector<Vector2d>& p, const Vector2d& x) {
-  bool in = false;
-  for (std::size_t i = 0, j = p.size() - 1; i < p.size(); j = i++)
-    if ((p[i].y() > x.y()) != (p[j].y() > x.y()) &&
-        x.x() < (p[j].x() - p[i].x()) * (x.y() - p[i].y()) / (p[j].y() - p[i].y()) + p[i].x())
-      in = !in;
-  return in;
-}
 
 class FaceMaker {
  public:
@@ -46,11 +32,13 @@ class FaceMaker {
       loops_.push_back(std::move(loop));
     }
     join_across_seams(plane_, boundaries_, loops_);
+    loops_[0].kind = LoopKind::outer;
     std::vector<TrimmedSurface> out;
-    for (std::vector<TrimLoop>& group : classified()) {
+    for (Material::Panel& panel : panels()) {
       TrimmedSurface face;
       face.surface = plane_.surface;
-      face.loops = std::move(group);
+      face.loops = std::move(panel.loops);
+      face.marks = std::move(panel.marks);
       fit_into_domain(plane_, boundaries_, face);
       for (TrimLoop& loop : face.loops)
         for (std::size_t i = 0; i < loop.curves.size(); ++i) {
@@ -63,70 +51,51 @@ class FaceMaker {
   }
 
  private:
-  // Outer loops with their holes. A loop within an odd number of others is a hole.
-  std::vector<std::vector<TrimLoop>> classified() {
-    const std::size_t n = loops_.size();
-    if (n == 1) {
-      loops_[0].kind = LoopKind::outer;
-      return {std::move(loops_)};
+  // The loops of each panel, cut where they meet. Loops that don't close stay as the file says, for validation to
+  // refuse with the place.
+  std::vector<Material::Panel> panels() {
+    Material::Panel as_said;
+    as_said.loops = loops_;
+    if (loops_.size() == 1) return {as_said};
+    gather(plane_, loops_);
+    TrimmedSurface closed;
+    closed.surface = plane_.surface;
+    closed.resolution = plane_.options.resolution;
+    closed.loops = loops_;
+    try {
+      close_loops(closed, {}, false);
+    } catch (const GeometryError&) {
+      return {as_said};
     }
-    std::vector<std::vector<Vector2d>> polygons;
-    std::vector<double> areas;
-    for (const TrimLoop& loop : loops_) {
-      polygons.push_back(polygon(loop.curves));
-      areas.push_back(std::abs(signed_area(polygons.back())));
+    Material material;
+    try {
+      material = material_of(closed.loops, {plane_.options.outer_known, meeting_tolerance(closed)});
+    } catch (const GeometryError& error) {
+      plane_.fail(boundaries_[0], error.what());
     }
-    // By a place on the inner loop; touching loops agree on most of theirs.
-    const auto within = [&](std::size_t inner, std::size_t outer) {
-      if (areas[inner] >= areas[outer]) return false;
-      std::size_t in = 0;
-      for (const Vector2d& x : polygons[inner])
-        in += contains(polygons[outer], shifted_into(x, polygons[outer])) ? 1 : 0;
-      return 2 * in > polygons[inner].size();
-    };
-    std::vector<std::vector<std::size_t>> around(n);
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = 0; j < n; ++j)
-        if (i != j && within(i, j)) around[i].push_back(j);
-    std::size_t outers = 0;
-    for (std::size_t i = 0; i < n; ++i) outers += around[i].size() % 2 == 0 ? 1 : 0;
-    const bool as_said = outers == 1 && around[0].empty();
-    if (plane_.options.outer_known && as_said) return {std::move(loops_)};
-    if (plane_.options.outer_known) {
-      // Loops beside each other where the file names one outer loop: a panel each.
-      plane_.note(boundaries_[0], "outer loop",
-                  outers == 1
-                      ? "the loop that the file calls the outer one lies within another; that one is taken"
-                      : std::to_string(outers) + " loops lie beside each other on one surface; each becomes a panel");
-    }
-    std::vector<std::vector<TrimLoop>> out;
-    std::vector<std::size_t> group(n);
-    for (std::size_t i = 0; i < n; ++i)
-      if (around[i].size() % 2 == 0) {
-        group[i] = out.size();
-        out.emplace_back();
-        out.back().push_back(loops_[i]);
-        out.back().back().kind = LoopKind::outer;
-      }
-    for (std::size_t i = 0; i < n; ++i) {
-      if (around[i].size() % 2 == 0) continue;
-      // Its panel is the innermost loop around it.
-      const std::size_t parent = *std::min_element(around[i].begin(), around[i].end(),
-                                                   [&](std::size_t x, std::size_t y) { return areas[x] < areas[y]; });
-      loops_[i].kind = LoopKind::hole;
-      out[group[parent]].push_back(std::move(loops_[i]));
-    }
-    return out;
+    for (Material::Panel& panel : material.panels)
+      for (std::size_t l = 0; l < panel.loops.size(); ++l)
+        if (panel.source[l] >= 0)
+          panel.loops[l].curves = std::move(loops_[static_cast<std::size_t>(panel.source[l])].curves);
+    report(material);
+    return std::move(material.panels);
   }
 
-  Vector2d shifted_into(Vector2d x, const std::vector<Vector2d>& of) const {
-    for (int k = 0; k < 2; ++k)
-      if (const double period = plane_.period[static_cast<std::size_t>(k)]; period > 0) {
-        double low = std::numeric_limits<double>::infinity();
-        for (const Vector2d& p : of) low = std::min(low, p[k]);
-        x[k] -= period * std::floor((x[k] - low) / period);
-      }
-    return x;
+  void report(const Material& material) {
+    if (plane_.options.outer_known && material.panels.size() > 1) {
+      plane_.note(
+          boundaries_[0], "outer loop",
+          std::to_string(material.panels.size()) + " loops lie beside each other on one surface; each becomes a panel");
+    } else if (plane_.options.outer_known && material.panels[0].source[0] > 0) {
+      plane_.note(boundaries_[0], "outer loop",
+                  "the loop that the file calls the outer one lies within another; that one is taken");
+    }
+    for (const LoopRepair& change : material.changes) {
+      BoundaryCurves& boundary = boundaries_[static_cast<std::size_t>(change.loop)];
+      plane_.note(boundary, "loops that meet",
+                  change.what + " (at " + format_real(change.place.x()) + ", " + format_real(change.place.y()) + ")");
+      boundary.converted = change.what;
+    }
   }
 
   FacePlane plane_;

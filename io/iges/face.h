@@ -16,7 +16,7 @@ struct BoundaryCurves {
   std::vector<Curve3> model;
   std::vector<Curve3> parameter;  // the file's parameters in x and y; empty where any edge has none
   std::string place;              // "panel.igs:412: entity 142: "
-  bool outer = false;             // the file says so
+  std::size_t record = 0;         // which of the face's boundary records it comes from
   // What was done to it, filled in: empty where the parameter curves are the file's own numbers.
   std::string converted;
 };

@@ -26,7 +26,7 @@ std::optional<int> nth_integer(const File& file, const Entry& e, int n) {
 // Surfaces that are a face where nobody uses them.
 bool stands_alone(const Entry& e) {
   return e.type == 114 || e.type == 118 || e.type == 120 || e.type == 122 || e.type == 128 || e.type == 140 ||
-         (e.type == 108 && e.form == 1);
+         e.type == 196 || e.type == 198 || (e.type == 108 && e.form == 1);
 }
 
 // Surfaces that another entity is made of. Groups and properties don't use what they name.

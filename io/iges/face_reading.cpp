@@ -4,6 +4,7 @@
 
 #include "geometry/error.h"
 #include "io/iges/boundary_reading.h"
+#include "io/iges/closed_chains.h"
 #include "io/iges/curve_reading.h"
 #include "io/iges/entity.h"
 #include "io/iges/surface_reading.h"
@@ -13,6 +14,8 @@
 namespace toile::iges {
 
 namespace {
+
+constexpr double usable_gap = 1e-3;  // of the surface's size
 
 // What a face's record says, whatever its entity.
 struct FaceRecord {
@@ -38,6 +41,8 @@ FaceRecord record_of(Reading& reading, const Entry& e) {
     if (out.has_outer) out.loops.insert(out.loops.begin(), face.outer);
     if (face.outer_was_denied)
       reading.note(e, "N1", "N1 is 0 though an outer boundary is given; the boundary is taken");
+    if (face.outer_is_missing)
+      reading.note(e, "PTO", "N1 is 1 though no outer boundary is named; the border of the surface is taken");
   } else if (e.type == 143) {
     BoundedSurface face = read_bounded_surface(in);
     out.surface = face.surface;
@@ -59,6 +64,11 @@ FaceRecord record_of(Reading& reading, const Entry& e) {
   return out;
 }
 
+// Planes, cylinders and cones end where their boundary does.
+bool has_no_end(const Entry& surface) {
+  return surface.type == 108 || surface.type == 190 || surface.type == 192 || surface.type == 194;
+}
+
 // 141 and 142 stand for each other, with a warning.
 const Entry& boundary_entry(Reading& reading, const Entry& e, const FaceRecord& face, int sequence, const char* role) {
   const Entry& found = reading.entry(sequence, e, role);
@@ -77,6 +87,58 @@ BoundaryCurves plane_boundary(Reading& reading, const Entry& plane, const Entry&
   out.place = reading.file.place(plane);
   const Eigen::Affine3d t = reading.transform(plane);
   for (const Curve3& c : curves_of(reading, curve.sequence, plane, "boundary")) out.model.push_back(transformed(t, c));
+  return out;
+}
+
+std::vector<std::array<Eigen::Vector3d, 2>> ends_of(const std::vector<Curve3>& curves) {
+  std::vector<std::array<Eigen::Vector3d, 2>> out;
+  for (const Curve3& c : curves) out.push_back({c.start(), c.end()});
+  return out;
+}
+
+// In space, by the standard's reading of the parameters; the surface goes on beyond its domain.
+std::vector<std::array<Eigen::Vector3d, 2>> ends_of(const std::vector<Curve3>& parameter_curves,
+                                                    const FileSurface& surface) {
+  std::vector<std::array<Eigen::Vector3d, 2>> out = ends_of(parameter_curves);
+  for (std::array<Eigen::Vector3d, 2>& ends : out)
+    for (Eigen::Vector3d& x : ends) {
+      const Eigen::Vector2d uv = surface.maps[0](x.head<2>());
+      x = surface.surface(uv.x(), uv.y());
+    }
+  return out;
+}
+
+// Boundaries with one closed chain each: a record may hold several.
+std::vector<BoundaryCurves> part_chains(Reading& reading, const FileSurface& surface,
+                                        std::vector<BoundaryCurves> boundaries) {
+  const Eigen::Matrix3Xd& net = surface.surface.points();
+  const double reach = usable_gap * (net.rowwise().maxCoeff() - net.rowwise().minCoeff()).norm();
+  std::vector<BoundaryCurves> out;
+  for (BoundaryCurves& b : boundaries) {
+    const std::vector<std::size_t> model = closed_chains(ends_of(b.model), reach),
+                                   parameter = closed_chains(ends_of(b.parameter, surface), reach);
+    const std::size_t chains = b.model.empty() ? parameter.size() : model.size();
+    if (chains == 1) {
+      out.push_back(std::move(b));
+      continue;
+    }
+    reading.notes.add("chains", b.place + "it holds " + std::to_string(chains) +
+                                    " closed chains of curves; each counts as a boundary");
+    const auto part = [&](const std::vector<Curve3>& curves, const std::vector<std::size_t>& begins, std::size_t k) {
+      const auto at = [&](std::size_t i) {
+        return curves.begin() + static_cast<std::ptrdiff_t>(i < begins.size() ? begins[i] : curves.size());
+      };
+      return std::vector<Curve3>(at(k), at(k + 1));
+    };
+    for (std::size_t k = 0; k < chains; ++k) {
+      BoundaryCurves& one = out.emplace_back();
+      one.place = b.place;
+      one.record = b.record;
+      one.model = b.model.empty() ? std::vector<Curve3>{} : part(b.model, model, k);
+      // Parameter curves that don't part alike are left out: the model curves stand.
+      if (parameter.size() == chains) one.parameter = part(b.parameter, parameter, k);
+    }
+  }
   return out;
 }
 
@@ -101,15 +163,20 @@ std::vector<TrimmedSurface> panels_of(Reading& reading, const Entry& e) {
         e.type == 108 ? plane_boundary(reading, e, from) : boundary_of(reading, from, record.surface);
     // A loop that is one vertex bounds nothing: a whole sphere.
     if (curves.model.empty() && curves.parameter.empty()) continue;
+    curves.record = entries.size();
     boundaries.push_back(std::move(curves));
     entries.push_back(&from);
   }
+  const Entry& carrier = reading.entry(record.surface, e, "surface");
+  if (record.bounded_by_domain && has_no_end(carrier))
+    throw InputError(reading.file.place(e) + "it names no outer boundary, and its surface (entity " +
+                     std::to_string(carrier.type) + ") has no border of its own");
   FaceOptions options;
   options.outer_known = record.has_outer || record.bounded_by_domain;
   options.resolution = reading.file.global.resolution;
   options.note = [&](const std::string& kind, const std::string& message) { reading.notes.add(kind, message); };
   std::string surface_name;
-  FileSurface base = surface_of(reading, reading.entry(record.surface, e, "surface"), boundaries, surface_name);
+  FileSurface base = surface_of(reading, carrier, boundaries, surface_name);
   std::string name = std::move(record.name);
   if (name.empty()) name = surface_name;
   std::vector<TrimmedSurface> panels;
@@ -124,23 +191,24 @@ std::vector<TrimmedSurface> panels_of(Reading& reading, const Entry& e) {
         points.topRows<2>() = c.curve.points();
         all[0].parameter.emplace_back(c.curve.knots(), std::move(points));
       }
+      all[0].record = entries.size();
       all.insert(all.end(), std::make_move_iterator(boundaries.begin()), std::make_move_iterator(boundaries.end()));
       boundaries = std::move(all);
-      entries.insert(entries.begin(), &e);
+      entries.push_back(&e);
     } else {
       panels.push_back(std::move(whole));
     }
   }
   if (panels.empty()) {
     try {
+      boundaries = part_chains(reading, base, std::move(boundaries));
       panels = make_faces(base, boundaries, options);
     } catch (const GeometryError& error) {
       throw InputError(error.what());
     }
   }
-  for (std::size_t i = 0; i < entries.size(); ++i)
-    reading.mark(*entries[i], boundaries[i].converted.empty() ? Disposition::read : Disposition::converted,
-                 boundaries[i].converted);
+  for (const BoundaryCurves& b : boundaries)
+    reading.mark(*entries[b.record], b.converted.empty() ? Disposition::read : Disposition::converted, b.converted);
   for (std::size_t i = 0; i < panels.size(); ++i) {
     panels[i].name = i == 0 || name.empty() ? name : name + " (" + std::to_string(i + 1) + ")";
     for (std::size_t k = 0; k < panels[i].loops.size(); ++k) panels[i].loops[k].index = static_cast<int>(k);

@@ -74,7 +74,7 @@ struct File {
   std::vector<std::string_view> start;
   Global global;
   std::vector<Entry> entries;
-  std::string parameters;  // columns 1 to 64 of all parameter lines, one after another
+  std::string parameters;  // columns 1 to 64 (or 65) of all parameter lines, one after another
   std::vector<ParameterLine> parameter_lines;
   int global_line = 1;
   bool terminated = false;  // a terminate line was there

@@ -8,6 +8,7 @@
 #include "geometry/measure.h"
 #include "geometry/refine.h"
 #include "io/iges/entity.h"
+#include "io/iges/parameter_reading.h"
 #include "trimming/pull_back.h"
 
 namespace toile::iges {
@@ -54,52 +55,6 @@ std::vector<std::size_t> order_by_ends(const std::vector<std::array<Point, 2>>& 
   return order;
 }
 
-// A point of the surface under a parameter that may lie a period away. Beyond an open border the polynomial goes on.
-Vector3d at(const FacePlane& plane, Vector2d uv) {
-  for (int k = 0; k < 2; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    if (!plane.closed[i] || plane.domain[i].contains(uv[k])) continue;
-    uv[k] -= plane.period[i] * std::floor((uv[k] - plane.domain[i].min) / plane.period[i]);
-    uv[k] = std::clamp(uv[k], plane.domain[i].min, plane.domain[i].max);
-  }
-  return plane.surface(uv.x(), uv.y());
-}
-
-double agreed(const FacePlane& plane) {
-  return std::max(10 * plane.options.resolution, 1e-4 * plane.size);
-}
-
-// How far a boundary's parameter curves, mapped, lie from its model curves: ends and middles of curves that are
-// paired, else starts and middles against the nearest model curve.
-double disagreement(const FacePlane& plane, const BoundaryCurves& b, const ParameterMap& map) {
-  double largest = 0;
-  const auto image = [&](const Curve3& c, double f) {
-    return at(plane, map(c(c.domain().min + f * c.domain().length()).head<2>()));
-  };
-  for (std::size_t i = 0; i < b.parameter.size(); ++i) {
-    const Curve3& c = b.parameter[i];
-    const Vector3d start = image(c, 0), middle = image(c, 0.5), end = image(c, 1);
-    if (b.parameter.size() == b.model.size()) {
-      const Curve3& m = b.model[i];
-      largest = std::max(largest, std::min(std::max((start - m.start()).norm(), (end - m.end()).norm()),
-                                           std::max((start - m.end()).norm(), (end - m.start()).norm())));
-      if ((middle - m(0.5 * (m.domain().min + m.domain().max))).norm() > agreed(plane))
-        largest = std::max(largest, closest_point(m, middle).distance);
-      continue;
-    }
-    for (const Vector3d& x : {start, middle}) {
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const Curve3& m : b.model) nearest = std::min(nearest, closest_point(m, x).distance);
-      largest = std::max(largest, nearest);
-    }
-  }
-  return largest;
-}
-
-double extent(const Curve3& c, int k) {
-  return std::max(std::abs(c.start()[k]), std::abs(c.end()[k]));
-}
-
 class LoopCurves {
  public:
   LoopCurves(const FacePlane& plane, const ParameterMap& map) : plane_(plane), map_(map) {}
@@ -126,8 +81,9 @@ class LoopCurves {
                           " model curves" + (trouble.empty() ? "; the parameter curves are taken" : ""));
       }
     }
-    if (own.size() == b.model.size())
-      for (TrimCurve& c : own) c.model = b.model[static_cast<std::size_t>(c.index)];
+    if (b.parameter.size() == b.model.size())
+      for (TrimCurve& c : own)
+        if (const auto i = static_cast<std::size_t>(c.index); i < b.model.size()) c.model = b.model[i];
     if (trouble.empty()) return own;
     if (b.model.empty()) {
       if (own.empty()) plane_.fail(b, "it has neither parameter curves nor model curves");
@@ -202,6 +158,26 @@ class LoopCurves {
     }
   }
 
+  // Whether the straight way between two places of the parameter plane is one point in space.
+  bool collapsed(const Vector2d& a, const Vector2d& b) const {
+    const double reach = std::max(plane_.options.resolution, 1e-6 * plane_.size);
+    const Vector3d start = point_at(plane_, a);
+    for (int k = 1; k <= 4; ++k)
+      if ((point_at(plane_, a + (b - a) * k / 4) - start).norm() > reach) return false;
+    return true;
+  }
+
+  // Where a surface is collapsed to a point, exporters leave out the side that has no length: a leg along it.
+  void bridge_poles(std::vector<TrimCurve>& curves) const {
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+      const Vector2d a = last(curves[i]), b = first(curves[(i + 1) % curves.size()]);
+      const Vector2d jump = (b - a).cwiseQuotient(Vector2d(plane_.domain[0].length(), plane_.domain[1].length()));
+      if (jump.norm() <= usable || std::min(std::abs(jump.x()), std::abs(jump.y())) > usable || !collapsed(a, b))
+        continue;
+      curves.insert(curves.begin() + static_cast<std::ptrdiff_t>(++i), leg(a, b, static_cast<int>(curves.size())));
+    }
+  }
+
   // Largest gap, and how far the curves leave the domain where it isn't closed; both relative to it.
   struct Fit {
     double gap = 0, excursion = 0;
@@ -239,8 +215,7 @@ class LoopCurves {
   std::vector<TrimCurve> from_parameters(BoundaryCurves& b, const std::vector<Curve3>& source) const {
     std::vector<Curve2> flat;
     double error = 0;
-    const bool plain = map_.u.affine() && map_.v.affine() && map_.u.scale == 1 && map_.u.shift == 0 &&
-                       map_.v.scale == 1 && map_.v.shift == 0;
+    const bool plain = map_.identity();
     const double speed = plain ? 1 : plane_.size / std::min(plane_.domain[0].length(), plane_.domain[1].length());
     const double tolerance = std::max(1e-9 * plane_.size, 0.1 * plane_.snap) / speed;
     for (const Curve3& c : source) {
@@ -266,6 +241,7 @@ class LoopCurves {
       return whole;
     }
     chain(out);
+    bridge_poles(out);
     if (fit_of(out).gap <= usable) return out;
     if (const std::vector<std::size_t> order = order_by_ends(ends, usable); !order.empty()) {
       std::vector<TrimCurve> sorted;
@@ -395,6 +371,7 @@ class LoopCurves {
     for (std::size_t i = 0; i < order.size(); ++i) out.curves[i].index = static_cast<int>(order[i]);
     out.sorted = !order.empty();
     chain(out.curves);
+    bridge_poles(out.curves);
     const std::size_t n = out.curves.size();
     for (std::size_t i = 0; i < n && !(n == 1 && out.curves[0].curve.points().cols() < 3); ++i) {
       TrimCurve &a = out.curves[i], &b = out.curves[(i + 1) % n];
@@ -430,31 +407,6 @@ class LoopCurves {
 };
 
 }  // namespace
-
-const ParameterMap& best_map(const FacePlane& plane, const std::vector<BoundaryCurves>& boundaries) {
-  if (plane.file.maps.size() == 1) return plane.file.maps[0];
-  const ParameterMap* best = &plane.file.maps[0];
-  double least = std::numeric_limits<double>::infinity();
-  bool seen = false;
-  for (const ParameterMap& map : plane.file.maps) {
-    double off = 0;
-    for (const BoundaryCurves& b : boundaries) {
-      if (b.parameter.empty() || b.model.empty()) continue;
-      seen = true;
-      off = std::max(off, disagreement(plane, b, map));
-    }
-    if (off < least * (1 - 1e-6) - 1e-12 * plane.size) {
-      least = off;
-      best = &map;
-    }
-  }
-  if (seen) return *best;
-  // Nothing to compare with: angles that stay within a turn of radians are radians.
-  double widest = 0;
-  for (const BoundaryCurves& b : boundaries)
-    for (const Curve3& c : b.parameter) widest = std::max(widest, extent(c, 0));
-  return widest > 6.3 ? plane.file.maps[0] : plane.file.maps[1];
-}
 
 std::vector<TrimCurve> loop_curves(const FacePlane& plane, const ParameterMap& map, BoundaryCurves& boundary) {
   return LoopCurves(plane, map).run(boundary);

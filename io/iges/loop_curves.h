@@ -5,10 +5,6 @@
 
 namespace toile::iges {
 
-// The reading of the file's parameters that lies nearest to the model curves: the standard's where nothing speaks
-// against it.
-const ParameterMap& best_map(const FacePlane& plane, const std::vector<BoundaryCurves>& boundaries);
-
 // The curves of a boundary as a loop: the file's parameter curves, or its model curves pulled back onto the surface.
 // Says in `boundary.converted` what was done to them. Throws GeometryError where there are none that can be used.
 std::vector<TrimCurve> loop_curves(const FacePlane& plane, const ParameterMap& map, BoundaryCurves& boundary);

@@ -13,7 +13,8 @@ namespace toile::iges {
 
 namespace {
 
-constexpr std::array kinds{MarkKind::grain, MarkKind::notch, MarkKind::drill, MarkKind::line, MarkKind::text};
+constexpr std::array kinds{MarkKind::grain, MarkKind::notch, MarkKind::drill, MarkKind::line,
+                           MarkKind::text,  MarkKind::sew,   MarkKind::slit};
 
 // The kind and the words of a label; other words are those of a line or a drill hole.
 void apply_label(const std::string& label, PanelMark& mark) {

@@ -19,7 +19,7 @@ bool holds_faces(const File& file) {
                              [&](const Entry& e) { return std::ranges::find(types, e.type) != types.end(); });
 }
 
-std::vector<TrimmedSurface> outline_panels(Reading& reading) {
+std::vector<TrimmedSurface> outline_panels(Reading& reading, std::vector<std::string>& refused) {
   std::set<int> parts;  // of composite curves and of definitions
   for (const Entry& e : reading.file.entries) {
     if (e.type != 102 && e.type != 308) continue;
@@ -74,7 +74,16 @@ std::vector<TrimmedSurface> outline_panels(Reading& reading) {
   }
   if (curves.empty()) return {};
   Outlines found = find_outlines(std::move(curves), points, reading.file.global.resolution);
-  for (const OutlineNote& n : found.notes) reading.note(*reading.file.find(n.id), "outline " + n.what, n.what);
+  for (const OutlineNote& n : found.notes) {
+    const Entry& e = *reading.file.find(n.id);
+    if (n.refused) {
+      TrimmedSurface of;
+      reading.sign(of, e);
+      refused.push_back(of.source + ": " + n.what);
+    } else {
+      reading.note(e, "outline " + n.what, n.what);
+    }
+  }
   for (std::size_t k = 0; k < found.panels.size(); ++k) {
     TrimmedSurface& panel = found.panels[k];
     const Entry& e = *reading.file.find(found.ids[k]);

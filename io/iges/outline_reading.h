@@ -1,4 +1,4 @@
-// A drawing without any face: closed plane outlines are panels. (iges.md, 12)
+// A drawing without any face: closed plane outlines are panels.
 #pragma once
 
 #include <vector>
@@ -9,6 +9,7 @@ namespace toile::iges {
 
 bool holds_faces(const File& file);
 
-std::vector<TrimmedSurface> outline_panels(Reading& reading);
+// `refused`: outlines that were meant as panels and can't be, with entity and reason.
+std::vector<TrimmedSurface> outline_panels(Reading& reading, std::vector<std::string>& refused);
 
 }  // namespace toile::iges

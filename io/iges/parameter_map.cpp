@@ -48,7 +48,38 @@ double AxisMap::derivative(double x) const {
   return scale * 0.5 * arc.rate * arc.half / (std::tan(0.5 * arc.half_angle) * c * c);
 }
 
+bool ParameterMap::identity() const {
+  const auto plain = [](const AxisMap& axis) { return axis.affine() && axis.scale == 1 && axis.shift == 0; };
+  return plain(u) && plain(v) && !swapped;
+}
+
+std::vector<ParameterMap> readings(const AxisReadings& u, const AxisReadings& v) {
+  const auto along = [](const AxisReadings& axis) {
+    std::vector<AxisMap> out{axis.standard};
+    for (const Interval& counted : axis.counted) {
+      AxisMap map = axis.standard;
+      map.scale = axis.range.length() / counted.length();
+      map.shift = axis.range.min - counted.min * map.scale;
+      const auto known = [&](const AxisMap& m) {
+        return std::abs(m.scale - map.scale) <= 1e-12 * map.scale &&
+               std::abs(m.shift - map.shift) <= 1e-12 * axis.range.length();
+      };
+      if (std::isfinite(map.scale) && map.scale > 0 && std::none_of(out.begin(), out.end(), known))
+        out.push_back(std::move(map));
+    }
+    return out;
+  };
+  std::vector<ParameterMap> out;
+  for (const bool swapped : {false, true})
+    for (const AxisMap& mu : along(u))
+      for (const AxisMap& mv : along(v)) out.push_back({mu, mv, swapped});
+  return out;
+}
+
 CarriedCurve carried(const Curve2& curve, const ParameterMap& map, const Eigen::Vector2d& tolerance) {
+  if (map.swapped)
+    return carried(Curve2(curve.knots(), curve.points().colwise().reverse(), curve.weights()), {map.u, map.v, false},
+                   tolerance);
   const Curve2::Points& points = curve.points();
   const auto constant = [&](int k) { return (points.row(k).array() == points(k, 0)).all(); };
   const std::array<const AxisMap*, 2> axes{&map.u, &map.v};

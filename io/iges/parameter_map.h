@@ -28,8 +28,22 @@ struct AxisMap {
 
 struct ParameterMap {
   AxisMap u, v;
-  Eigen::Vector2d operator()(const Eigen::Vector2d& x) const { return {u(x.x()), v(x.y())}; }
+  bool swapped = false;  // the file names v first
+  Eigen::Vector2d operator()(const Eigen::Vector2d& x) const {
+    return swapped ? Eigen::Vector2d(u(x.y()), v(x.x())) : Eigen::Vector2d(u(x.x()), v(x.y()));
+  }
+  bool identity() const;
 };
+
+// What a file may count along one direction in place of the standard's parameter: `standard` runs over `range`, the
+// file over one of `counted`, linearly.
+struct AxisReadings {
+  AxisMap standard;
+  Interval range;
+  std::vector<Interval> counted;
+};
+// All pairs of readings, the standard's first, then those with u and v swapped.
+std::vector<ParameterMap> readings(const AxisReadings& u, const AxisReadings& v);
 
 // The image of a parameter curve. Exact where the maps are affine where the curve goes, and as a set of points for
 // lines of constant u or v; else a cubic within `tolerance` [parameters of the NURBS], the error reported.

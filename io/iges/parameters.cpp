@@ -96,18 +96,26 @@ std::optional<double> parse_real(std::string_view text) {
   const char* end = begin + text.size();
   double value = 0;
   auto result = std::from_chars(begin, end, value);
-  if (result.ptr != end && (*result.ptr == 'D' || *result.ptr == 'd') && text.size() < buffer.size()) {
-    std::copy(begin, end, buffer.begin());
-    buffer[static_cast<std::size_t>(result.ptr - begin)] = 'E';
-    begin = buffer.data();
-    end = begin + text.size();
-    result = std::from_chars(begin, end, value);
+  if (result.ptr != end && text.size() + 1 < buffer.size()) {
+    // Fortran writes the exponent behind a D, or behind its sign alone where it takes three digits.
+    const auto mantissa = static_cast<std::size_t>(result.ptr - begin);
+    const bool letter = *result.ptr == 'D' || *result.ptr == 'd';
+    const bool sign =
+        (*result.ptr == '+' || *result.ptr == '-') && text.substr(0, mantissa).find('.') != std::string_view::npos;
+    if (letter || sign) {
+      char* at = std::copy_n(begin, mantissa, buffer.data());
+      *at++ = 'E';
+      end = std::copy(begin + mantissa + (letter ? 1 : 0), end, at);
+      begin = buffer.data();
+      result = std::from_chars(begin, end, value);
+    }
   }
   if (result.ptr != end) return std::nullopt;
   if (result.ec == std::errc::result_out_of_range) {
     // Too small to be told from zero is zero; too large is no number.
-    const std::size_t e = text.find_first_of("EeDd");
-    if (e != std::string_view::npos && text.find('-', e) != std::string_view::npos) return 0.0;
+    const std::string_view read(begin, static_cast<std::size_t>(end - begin));
+    const std::size_t e = read.find_first_of("Ee");
+    if (e != std::string_view::npos && read.find('-', e) != std::string_view::npos) return 0.0;
     return std::nullopt;
   }
   if (result.ec != std::errc() || !std::isfinite(value)) return std::nullopt;

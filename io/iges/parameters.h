@@ -26,8 +26,9 @@ struct Tokens {
 // Cuts `text` up to the record delimiter.
 void tokenize(std::string_view text, Delimiters delimiters, Tokens& out);
 
-// A number in any of the forms that files hold (leading +, D exponents, missing digits on one side of the point), never
-// depending on the locale; nullopt for anything else and for values that are not finite.
+// A number in any of the forms that files hold (leading +, D exponents, exponents without a letter as in "1.0+002",
+// missing digits on one side of the point), never depending on the locale; nullopt for anything else and for values
+// that are not finite.
 std::optional<double> parse_real(std::string_view text);
 std::optional<int> parse_integer(std::string_view text);
 
@@ -60,6 +61,7 @@ class Parameters {
   void note(const std::string& kind, const std::string& what) const;
 
   const Entry& entry() const { return entry_; }
+  double resolution() const { return file_.global.resolution; }
 
  private:
   [[noreturn]] void fail_token(const char* what, int number, std::string_view text, const char* expected) const;

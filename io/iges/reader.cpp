@@ -4,6 +4,7 @@
 #include "geometry/error.h"
 #include "io/file.h"
 #include "io/iges.h"
+#include "io/iges/cards.h"
 #include "io/iges/entity.h"
 #include "io/iges/face_finding.h"
 #include "io/iges/face_reading.h"
@@ -34,7 +35,7 @@ void finish_names(std::vector<TrimmedSurface>& panels, const std::vector<std::st
   }
 }
 
-std::vector<TrimmedSurface> read_panels(Reading& reading) {
+std::vector<TrimmedSurface> read_panels(Reading& reading, std::vector<std::string>& refused) {
   std::vector<TrimmedSurface> panels;
   std::vector<const Entry*> entries;
   for (const PlacedFace& face : find_faces(reading)) {
@@ -58,16 +59,17 @@ std::vector<TrimmedSurface> read_panels(Reading& reading) {
   read_marks(reading, entries, panels);
   std::vector<std::string> labels;
   for (const Entry* e : entries) labels.push_back(e->label);
-  if (!holds_faces(reading.file)) panels = outline_panels(reading);
+  if (!holds_faces(reading.file)) panels = outline_panels(reading, refused);
   labels.resize(panels.size());
   if (panels.empty() && !reading.first_failure().empty()) throw InputError(reading.first_failure());
   finish_names(panels, labels);
   return panels;
 }
 
+// The program that wrote the file. (The product, field 3, names what is in it.)
 std::string exporter(const Global& g) {
   std::string out;
-  for (const std::string& part : {g.product, g.system, g.preprocessor})
+  for (const std::string& part : {g.system, g.preprocessor})
     if (!part.empty() && out.find(part) == std::string::npos) out += (out.empty() ? "" : ", ") + part;
   return out;
 }
@@ -91,9 +93,10 @@ PanelFile read_text(std::string text, const std::string& name) {
   out.metres_per_unit = g.metres_per_unit;
   out.resolution = g.resolution;
   out.exporter = exporter(g);
+  out.up = read_up(out.file->start);
   for (const Entry& e : out.file->entries) ++out.entities[e.type];
   Reading reading(*out.file, out.ledger);
-  out.panels = read_panels(reading);
+  out.panels = read_panels(reading, out.refused);
   out.warnings = reading.notes.list();
   warn_of_unread(out);
   return out;

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "geometry/error.h"
+#include "io/iges/cards.h"
 #include "io/iges/entity.h"
 
 namespace toile::iges {
@@ -46,8 +47,13 @@ Eigen::Affine3d Reading::transform(const Entry& e) {
       throw InputError(file.place(*at) + "its transformation is an entity " + std::to_string(matrix.type) +
                        ", must be 124");
     Parameters in(file, matrix, &notes);
-    result = read_transform(in) * result;
-    mark(matrix, Disposition::read);
+    const Eigen::Affine3d own = read_transform(in);
+    if (matrix.label == aside_label) {
+      mark(matrix, Disposition::converted, "moves panels aside for viewing: they are read where they would be without");
+    } else {
+      result = own * result;
+      mark(matrix, Disposition::read);
+    }
     at = &matrix;
   }
   return result;

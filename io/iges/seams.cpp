@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -46,6 +47,27 @@ std::optional<double> pole(const FacePlane& plane, std::size_t k, bool forward) 
   if (collapsed[0]) return plane.domain[other].min;
   if (collapsed[1]) return plane.domain[other].max;
   return std::nullopt;
+}
+
+Interval range(const TrimLoop& loop, int axis) {
+  Interval r{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (const Vector2d& p : polygon(loop.curves)) {
+    r.min = std::min(r.min, p[axis]);
+    r.max = std::max(r.max, p[axis]);
+  }
+  return r;
+}
+
+double box_area(const TrimLoop& loop) {
+  return range(loop, 0).length() * range(loop, 1).length();
+}
+
+void shift(PanelMark& mark, int axis, double by) {
+  mark.at[axis] += by;
+  if (!mark.curve) return;
+  Curve2::Points points = mark.curve->points();
+  points.row(axis).array() += by;
+  mark.curve = Curve2(mark.curve->knots(), std::move(points), mark.curve->weights());
 }
 
 NurbsSurface unrolled_u(const NurbsSurface& closed, Interval window) {
@@ -124,28 +146,38 @@ void join_across_seams(const FacePlane& plane, std::vector<BoundaryCurves>& boun
   }
 }
 
+void gather(const FacePlane& plane, std::vector<TrimLoop>& loops) {
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (!plane.closed[k]) continue;
+    const int axis = static_cast<int>(k);
+    const double period = plane.period[k], slack = 1e-9 * period;
+    const auto largest = std::ranges::max_element(loops, {}, [](const TrimLoop& l) { return box_area(l); });
+    const double begin = range(*largest, axis).min;
+    std::vector<TrimLoop> again;
+    for (TrimLoop& loop : loops) {
+      const Interval r = range(loop, axis);
+      const double by = -period * std::floor((r.min + slack - begin) / period);
+      for (TrimCurve& c : loop.curves) shift(c, axis, by);
+      if (&loop == &*largest || r.max + by - period <= begin + slack) continue;
+      again.push_back(loop);
+      for (TrimCurve& c : again.back().curves) shift(c, axis, -period);
+    }
+    std::ranges::move(again, std::back_inserter(loops));
+  }
+}
+
 void fit_into_domain(const FacePlane& plane, std::vector<BoundaryCurves>& boundaries, TrimmedSurface& face) {
   for (std::size_t k = 0; k < 2; ++k) {
     if (!plane.closed[k]) continue;
-    const auto axis = static_cast<Eigen::Index>(k);
     const double period = plane.period[k], slack = 1e-9 * period;
-    const auto range = [&](const TrimLoop& loop) {
-      Interval r{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-      for (const Vector2d& p : polygon(loop.curves)) {
-        r.min = std::min(r.min, p[axis]);
-        r.max = std::max(r.max, p[axis]);
-      }
-      return r;
-    };
-    const auto move = [&](TrimLoop& loop, double by) {
-      for (TrimCurve& c : loop.curves) shift(c, static_cast<int>(k), by);
-    };
     TrimLoop& outer = face.loops[0];
     const BoundaryCurves& place = boundaries[static_cast<std::size_t>(outer.index)];
-    Interval r = range(outer);
+    Interval r = range(outer, static_cast<int>(k));
     const double by = -period * std::floor((r.min + slack - plane.domain[k].min) / period);
     if (by != 0) {
-      move(outer, by);
+      for (TrimLoop& loop : face.loops)
+        for (TrimCurve& c : loop.curves) shift(c, static_cast<int>(k), by);
+      for (PanelMark& mark : face.marks) shift(mark, static_cast<int>(k), by);
       r.min += by, r.max += by;
       plane.note(place, "period",
                  "the loop lies beyond the closed surface's domain; it is moved by " + format_real(by));
@@ -160,10 +192,6 @@ void fit_into_domain(const FacePlane& plane, std::vector<BoundaryCurves>& bounda
                  "the loop crosses the seam of the closed surface; the surface is unrolled from " +
                      format_real(window.min) + " to " + format_real(window.max));
       boundaries[static_cast<std::size_t>(outer.index)].converted = "surface unrolled over its seam";
-    }
-    for (std::size_t i = 1; i < face.loops.size(); ++i) {
-      const Interval hole = range(face.loops[i]);
-      move(face.loops[i], -period * std::floor((hole.min + slack - window.min) / period));
     }
   }
 }

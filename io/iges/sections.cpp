@@ -313,6 +313,31 @@ void resolve_records(File& file) {
   }
 }
 
+// Some exporters write 65 columns of data and seven of the directory number: then only the latter names an entry.
+bool holds_65_columns(std::string_view line, std::size_t directory_lines) {
+  if (is_blank(line[64])) return false;
+  const auto names_entry = [&](std::string_view text) {
+    const int number = parse_integer(text).value_or(0);
+    return number % 2 == 1 && 0 < number && static_cast<std::size_t>(number) <= directory_lines;
+  };
+  return !names_entry(line.substr(64)) && names_entry(line.substr(65));
+}
+
+// The lines so far, which left their last column blank, to this many columns.
+void widen(File& file, std::size_t columns) {
+  std::string wider;
+  wider.reserve(file.parameters.capacity());
+  for (std::size_t i = 0; i < file.parameter_lines.size(); ++i) {
+    const std::size_t begin = file.parameter_lines[i].begin;
+    const std::size_t end =
+        i + 1 < file.parameter_lines.size() ? file.parameter_lines[i + 1].begin : file.parameters.size();
+    file.parameter_lines[i].begin = wider.size();
+    wider.append(file.parameters, begin, end - begin);
+    wider.append(columns - std::min(columns, end - begin), ' ');
+  }
+  file.parameters = std::move(wider);
+}
+
 struct DirectoryCard {
   std::string_view data;
   int line, number;
@@ -398,6 +423,7 @@ std::shared_ptr<const File> parse_file(std::string text, const std::string& name
   std::string_view terminate;
   int sections = 0, last_line = 0, global_lines = 0;
   std::array<int, 4> counts{};  // S, G, D, P
+  std::size_t columns = 64;     // of data on a parameter line
   file.parameters.reserve(file.text.size());
   auto note = [&](const std::string& kind, int line, const std::string& what) {
     file.notes.add(kind, name + ":" + std::to_string(line) + ": " + what);
@@ -447,8 +473,12 @@ std::shared_ptr<const File> parse_file(std::string text, const std::string& name
         std::string_view data = line.data;
         std::string_view owner;
         if (line.aligned) {
-          owner = data.substr(64);
-          data = data.substr(0, 64);
+          if (columns == 64 && holds_65_columns(data, directory.size())) {
+            note("65 columns", number, "parameter lines hold 65 columns of data before a pointer of seven");
+            widen(file, ++columns);
+          }
+          owner = data.substr(columns);
+          data = data.substr(0, columns);
         } else {
           const std::size_t at = data.size() > 8 ? data.size() - 8 : 0;
           owner = data.substr(at);
@@ -456,7 +486,7 @@ std::shared_ptr<const File> parse_file(std::string text, const std::string& name
         }
         file.parameter_lines.push_back({file.parameters.size(), number, parse_integer(owner).value_or(0)});
         file.parameters += data;
-        if (data.size() < 64) file.parameters.append(64 - data.size(), ' ');
+        if (data.size() < columns) file.parameters.append(columns - data.size(), ' ');
         break;
       }
       default:

@@ -35,6 +35,9 @@ void write(const PowerSpline& spline, Record& out) {
 
 namespace {
 
+constexpr double negligible = 1e-6;  // of the size: what files with few digits leave between pieces
+constexpr const char* or_what = " (the file's resolution, or 1e-6 of the size)";
+
 // Rows of a 4 x n matrix hold the coefficients of 1, s, s^2, s^3 on [0, length]; the result holds the p + 1 Bernstein
 // coefficients, p <= 3 being enough for what is there.
 Eigen::MatrixXd bernstein(const Eigen::MatrixXd& powers, double length, int p) {
@@ -62,24 +65,27 @@ KnotVector piecewise_knots(int degree, const std::vector<double>& breaks) {
 
 }  // namespace
 
-Curve3 to_curve(const PowerSpline& spline) {
+JoinedCurve to_curve(const PowerSpline& spline, double tolerance) {
   const auto n = static_cast<Eigen::Index>(spline.breaks.size()) - 1;
   const Eigen::Map<const Eigen::Matrix<double, 4, Eigen::Dynamic>> powers(spline.coefficients.data(), 4, 3 * n);
   int degree = 3;
   while (degree > 1 && (powers.row(degree).array() == 0).all()) --degree;
   Eigen::Matrix3Xd points(3, degree * n + 1);
+  double gap = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const double length = spline.breaks[static_cast<std::size_t>(i) + 1] - spline.breaks[static_cast<std::size_t>(i)];
     const Eigen::MatrixXd piece = bernstein(powers.middleCols(3 * i, 3), length, degree).transpose();
     if (i > 0) {
       const double jump = (piece.col(0) - points.col(degree * i)).norm();
       const double size = powers.row(0).cwiseAbs().maxCoeff() + piece.cwiseAbs().maxCoeff();
-      if (jump > 1e-6 * size)
-        throw GeometryError("the spline jumps by " + format_real(jump) + " at breakpoint " + std::to_string(i));
+      if (const double allowed = std::max(tolerance, negligible * size); jump > allowed)
+        throw GeometryError("the spline jumps by " + format_real(jump) + " at breakpoint " + std::to_string(i) +
+                            ", must be at most " + format_real(allowed) + or_what);
+      gap = std::max(gap, jump);
     }
     points.middleCols(degree * i, degree + 1) = piece;
   }
-  return Curve3(piecewise_knots(degree, spline.breaks), std::move(points));
+  return {Curve3(piecewise_knots(degree, spline.breaks), std::move(points)), gap};
 }
 
 PowerSurface read_power_surface(Parameters& in) {
@@ -115,7 +121,7 @@ void write(const PowerSurface& s, Record& out) {
     for (const double x : *numbers) out.real(x);
 }
 
-NurbsSurface to_surface(const PowerSurface& s) {
+JoinedSurface to_surface(const PowerSurface& s, double tolerance) {
   const int m = static_cast<int>(s.u.size()) - 1, n = static_cast<int>(s.v.size()) - 1;
   // Patch (i, j): x, y, z, each 4 x 4 with powers of s down the columns and of t along the rows.
   const auto patch = [&](int i, int j, int axis) {
@@ -132,7 +138,7 @@ NurbsSurface to_surface(const PowerSurface& s) {
         }
   const int p = degree[0], q = degree[1], count = p * m + 1;
   Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(count) * (q * n + 1));
-  double jump = 0;
+  double gap = 0;
   for (int i = 0; i < m; ++i) {
     const double du = s.u[static_cast<std::size_t>(i) + 1] - s.u[static_cast<std::size_t>(i)];
     for (int j = 0; j < n; ++j) {
@@ -143,15 +149,16 @@ NurbsSurface to_surface(const PowerSurface& s) {
         for (int b = 0; b <= q; ++b)
           for (int a = 0; a <= p; ++a) {
             double& x = points(axis, p * i + a + count * (q * j + b));
-            if ((a == 0 && i > 0) || (b == 0 && j > 0)) jump = std::max(jump, std::abs(x - net(b, a)));
+            if ((a == 0 && i > 0) || (b == 0 && j > 0)) gap = std::max(gap, std::abs(x - net(b, a)));
             x = net(b, a);
           }
       }
     }
   }
-  if (jump > 1e-6 * points.cwiseAbs().maxCoeff())
-    throw GeometryError("the patches of the spline surface leave a gap of " + format_real(jump));
-  return NurbsSurface(piecewise_knots(p, s.u), piecewise_knots(q, s.v), std::move(points));
+  if (const double allowed = std::max(tolerance, negligible * points.cwiseAbs().maxCoeff()); gap > allowed)
+    throw GeometryError("the patches of the spline surface leave a gap of " + format_real(gap) + ", must be at most " +
+                        format_real(allowed) + or_what);
+  return {NurbsSurface(piecewise_knots(p, s.u), piecewise_knots(q, s.v), std::move(points)), gap};
 }
 
 }  // namespace toile::iges

@@ -87,8 +87,13 @@ FileSurface own_surface(Reading& reading, const Entry& e, const Eigen::Affine3d&
       const PowerSurface s = read_power_surface(in);
       name = reading.name_property(in);
       FileSurface out;
-      out.surface = to_surface(s);
+      JoinedSurface joined = to_surface(s, in.resolution());
+      out.surface = std::move(joined.surface);
       out.how = "parametric spline surface as B-spline surface";
+      if (joined.gap > 1e-12 * out.surface.points().cwiseAbs().maxCoeff())
+        out.how += ", gaps of up to " + format_real(joined.gap) + " between its patches closed";
+      const Interval u = out.surface.u().domain(), v = out.surface.v().domain();
+      out.maps = readings({{}, u, {{0, u.length()}, {0, 1}}}, {{}, v, {{0, v.length()}, {0, 1}}});
       return out;
     }
     case 118: {

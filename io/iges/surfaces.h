@@ -32,11 +32,12 @@ struct Frame {
   Frame placed(const Eigen::Affine3d& t) const { return {t * origin, t.linear() * x, t.linear() * y, t.linear() * z}; }
 };
 
-// What a surface of the file became. Several `maps`: exporters disagree (degrees or radians); the first is the
-// standard's.
+// What a surface of the file became. Several `maps`: exporters disagree (degrees or radians, angles from 0 or from
+// where an arc starts, lengths or fractions); the first is the standard's.
 struct FileSurface {
   NurbsSurface surface;
   std::vector<ParameterMap> maps = {{}};
+  bool degrees_or_radians = false;  // the first two maps differ in the unit of angles alone
   double error = 0;                 // of a surface that no NURBS is exactly
   std::string how;                  // empty: the file's own numbers
   std::optional<Frame> plane = {};  // of a plane: its parameters are x and y there

@@ -213,6 +213,10 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
     std::reverse(second.turns.begin(), second.turns.end());
   }
   UnitCurve a = over_unit(first), b = over_unit(second);
+  const Interval own = first.curve.domain();
+  const auto all_readings = [&](const AxisMap& map) {
+    return readings({map, {0, 1}, {own, {0, own.length()}, second.curve.domain()}}, {{}, {0, 1}, {}});
+  };
   if (by_length && constant_speed(first) && constant_speed(second)) by_length = false;
   FileSurface out;
   out.how = "ruled surface as B-spline surface";
@@ -221,7 +225,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
   const bool like = c.weights() == d.weights() || (!c.rational() && !d.rational());
   if (exact && !like && 2 * c.degree() <= max_degree) {
     out.surface = ruled_over_product(c, d);
-    out.maps[0].u = a.map;
+    out.maps = all_readings(a.map);
     return out;
   }
   if (exact && like) {
@@ -234,7 +238,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
       weights.insert(weights.end(), c.weights().begin(), c.weights().end());
     }
     out.surface = NurbsSurface(c.knots(), KnotVector(), std::move(points), std::move(weights));
-    out.maps[0].u = a.map;
+    out.maps = all_readings(a.map);
     return out;
   }
   // No NURBS has these rulings in the file's parameters: a fit in those.
@@ -259,6 +263,7 @@ FileSurface to_surface(const Ruled& ruled, NaturalCurve first, NaturalCurve seco
       breaks, {{0, 0}, {1, 0}}, tolerance, by_length ? 64 : 128);
   out.surface = fit.surface;
   out.error = fit.error;
+  out.maps = all_readings({});
   return out;
 }
 
@@ -310,15 +315,21 @@ FileSurface to_surface(const Revolution& revolution, const Curve3& axis, const N
   Interval angle{revolution.start, revolution.end};
   if (angle.max < angle.min) std::swap(angle.min, angle.max);
   if (angle.max == angle.min) angle.max += whole;
-  if (angle.length() > whole * (1 + 1e-6)) throw GeometryError("it turns by more than a full circle");
+  FileSurface out;
+  out.how = "surface of revolution as rational B-spline surface";
+  // More than a turn covers nothing new; loops beyond the first turn are moved by a period.
+  if (angle.length() > whole * (1 + 1e-6)) out.how += ", its " + format_real(angle.length() / whole) + " turns as one";
   // Full circles that are written with few digits.
   if (angle.length() > whole * (1 - 1e-9)) angle.max = angle.min + whole;
-  FileSurface out;
   out.surface = revolved(clamp(generatrix.curve), axis.start(), direction, angle);
-  out.maps[0].u.turns = generatrix.turns;
   const int arcs = (out.surface.count_v() - 1) / 2;
-  out.maps[0].v.turns = {{angle, arcs, angle.length()}};
-  out.how = "surface of revolution as rational B-spline surface";
+  const Interval along = generatrix.curve.domain();
+  constexpr double degree = std::numbers::pi / 180;
+  out.maps =
+      readings({{1, 0, generatrix.turns}, along, {{0, along.length()}, {0, 1}}},
+               {{1, 0, {{angle, arcs, angle.length()}}},
+                angle,
+                {{0, angle.length()}, {0, 1}, {angle.min / degree, angle.max / degree}, {0, angle.length() / degree}}});
   return out;
 }
 
@@ -344,7 +355,8 @@ FileSurface to_surface(const Tabulated& tabulated, const NaturalCurve& directrix
   weights.insert(weights.end(), c.curve.weights().begin(), c.curve.weights().end());
   FileSurface out;
   out.surface = NurbsSurface(c.curve.knots(), KnotVector(), std::move(points), std::move(weights));
-  out.maps[0].u = c.map;
+  const Interval own = directrix.curve.domain();
+  out.maps = readings({c.map, {0, 1}, {own, {0, own.length()}}}, {{}, {0, 1}, {{0, way.norm()}}});
   out.how = "tabulated cylinder as B-spline surface";
   return out;
 }

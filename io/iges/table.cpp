@@ -47,7 +47,7 @@ Curve3 conic_curve(Parameters& in) {
   return to_curve(read_conic(in));
 }
 Curve3 power_curve(Parameters& in) {
-  return to_curve(read_power_spline(in));
+  return to_curve(read_power_spline(in), in.resolution()).curve;
 }
 
 // Forms 20 to 40 are drawings: centre lines, hatching, witness lines.

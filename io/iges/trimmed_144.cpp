@@ -23,8 +23,7 @@ Face read_face(Parameters& in) {
   const int n1 = in.integer("N1");
   const int n2 = in.integer("N2");
   face.outer = in.pointer("PTO");
-  if (n1 != 0 && face.outer == 0)
-    in.fail("N1 is " + std::to_string(n1) + " but there is no pointer to an outer boundary");
+  face.outer_is_missing = n1 != 0 && face.outer == 0;
   face.outer_was_denied = n1 == 0 && face.outer != 0;
   if (n2 < 0) in.fail("N2 is " + std::to_string(n2) + ", must not be negative");
   in.expect(n2, std::to_string(n2) + " inner boundaries");

@@ -1,4 +1,5 @@
 // Faces to records. Parameter curves are written as they are; model curves are made anew from the surface.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -31,7 +32,10 @@ constexpr double text_height = 0.02;  // of the face's size
 class FaceWriter {
  public:
   explicit FaceWriter(std::vector<OutRecord>& records) : records_(records) {}
-  void add(const OutputFace& output);
+  // Returns the number of what stands for the face: its own, or that of the group of the face and its marks.
+  int add(const OutputFace& output);
+  void name_level(int level, const std::string& words);
+  void group(const std::vector<int>& members, const std::string& words);
   double largest_fit() const { return largest_fit_; }
 
  private:
@@ -57,12 +61,13 @@ class FaceWriter {
   int boundary(const TrimLoop& loop, const NurbsSurface& surface, int surface_number,
                const std::optional<AffinePatch>& patch, double tolerance);
   int colour(const std::array<double, 3>& rgb);
+  int moved_aside(const Eigen::Vector3d& by);
   int name(const std::string& words);
-  void marks(const OutputFace& output, int face_number, int surface_number, const std::optional<AffinePatch>& patch,
-             double size);
+  int marks(const OutputFace& output, int face_number, int surface_number, const std::optional<AffinePatch>& patch,
+            double size);
 
   std::vector<OutRecord>& records_;
-  std::map<std::array<double, 3>, int> colours_;
+  std::map<std::array<double, 3>, int> colours_, asides_;
   double largest_fit_ = 0;
 };
 
@@ -82,6 +87,16 @@ int FaceWriter::colour(const std::array<double, 3>& rgb) {
   if (found != colours_.end()) return found->second;
   const Colour entity{100 * rgb[0], 100 * rgb[1], 100 * rgb[2], {}};
   return colours_[rgb] = add({.type = 314, .status = definition}, entity);
+}
+
+// The number of the transformation, 0 for none.
+int FaceWriter::moved_aside(const Eigen::Vector3d& by) {
+  if (by.isZero(0)) return 0;
+  const std::array<double, 3> key{by.x(), by.y(), by.z()};
+  const auto found = asides_.find(key);
+  if (found != asides_.end()) return found->second;
+  const Eigen::Affine3d move(Eigen::Translation3d{by});
+  return asides_[key] = add({.type = 124, .label = aside_label, .status = dependent}, move);
 }
 
 // The curves in the file's order and direction. A loop that is traversed against it has all its curves reversed; a
@@ -125,20 +140,21 @@ int FaceWriter::boundary(const TrimLoop& loop, const NurbsSurface& surface, int 
                                                           .preference = 1});
 }
 
-void FaceWriter::add(const OutputFace& output) {
+int FaceWriter::add(const OutputFace& output) {
   const TrimmedSurface& face = output.face;
   const NurbsSurface& s = face.surface;
   const std::string& words = output.name.empty() ? face.name : output.name;
   const int colour_number = output.colour ? -colour(*output.colour) : 0;
   const int name_number = words.empty() ? 0 : name(words);
+  const int aside = moved_aside(output.aside);
   const SplineSurface spline{s, s.u().domain(), s.v().domain()};
   // A face without a trim is the surface itself, free-standing; with marks on it, it can't be.
   if (face.natural_bounds && face.marks.empty()) {
     Record record(128);
     write(spline, record);
-    add_named({.type = 128, .level = output.level, .colour = colour_number, .status = independent}, record,
-              name_number);
-    return;
+    return add_named(
+        {.type = 128, .level = output.level, .colour = colour_number, .transform = aside, .status = independent},
+        record, name_number);
   }
   const double size = (s.points().rowwise().maxCoeff() - s.points().rowwise().minCoeff()).norm();
   const std::optional<AffinePatch> patch = affine_patch(s, 0.1 * curve_tolerance * size);
@@ -161,8 +177,22 @@ void FaceWriter::add(const OutputFace& output) {
   Record record(144);
   write(record_of_face, record);
   const int face_number = add_named(
-      {.type = 144, .level = output.level, .colour = colour_number, .status = independent}, record, name_number);
-  if (!face.marks.empty()) marks(output, face_number, surface_number, patch, size);
+      {.type = 144, .level = output.level, .colour = colour_number, .transform = aside, .status = independent}, record,
+      name_number);
+  return face.marks.empty() ? face_number : marks(output, face_number, surface_number, patch, size);
+}
+
+void FaceWriter::name_level(int level, const std::string& words) {
+  Record record(406);
+  write_level_function(words, record);
+  add({.type = 406, .form = 3, .level = level, .status = definition}, record);
+}
+
+void FaceWriter::group(const std::vector<int>& members, const std::string& words) {
+  const int name_number = words.empty() ? 0 : name(words);
+  Record record(402);
+  write_group(members, 7, record);
+  add_named({.type = 402, .form = 7, .status = independent}, record, name_number);
 }
 
 int FaceWriter::name(const std::string& words) {
@@ -177,10 +207,11 @@ int FaceWriter::add_named(const Card& card, Record& record, int name_number) {
   return add(card, record);
 }
 
-void FaceWriter::marks(const OutputFace& output, int face_number, int surface_number,
-                       const std::optional<AffinePatch>& patch, double size) {
+int FaceWriter::marks(const OutputFace& output, int face_number, int surface_number,
+                      const std::optional<AffinePatch>& patch, double size) {
   const NurbsSurface& s = output.face.surface;
   std::vector<int> members{face_number};
+  const int aside = moved_aside(output.aside);
   for (const PanelMark& mark : output.face.marks) {
     if (mark.curve) {
       const int label = name(label_of(mark));
@@ -192,21 +223,23 @@ void FaceWriter::marks(const OutputFace& output, int face_number, int surface_nu
                      .model_curve = curve(model_curve, dependent),
                      .preference = 1},
             record);
-      members.push_back(add_named({.type = 142, .level = output.level, .status = independent}, record, label));
+      members.push_back(
+          add_named({.type = 142, .level = output.level, .transform = aside, .status = independent}, record, label));
     } else if (mark.kind == MarkKind::text) {
       Record record(212);
       write(NoteString{s(mark.at.x(), mark.at.y()), mark.text}, text_height * size, record);
-      members.push_back(add({.type = 212, .level = output.level, .status = annotation}, record));
+      members.push_back(add({.type = 212, .level = output.level, .transform = aside, .status = annotation}, record));
     } else {
       const int label = name(label_of(mark));
       Record record(116);
       write(PlacePoint{s(mark.at.x(), mark.at.y()), 0}, record);
-      members.push_back(add_named({.type = 116, .level = output.level, .status = independent}, record, label));
+      members.push_back(
+          add_named({.type = 116, .level = output.level, .transform = aside, .status = independent}, record, label));
     }
   }
   Record record(402);
   write_group(members, 7, record);
-  add({.type = 402, .form = 7, .level = output.level, .status = independent}, record);
+  return add({.type = 402, .form = 7, .level = output.level, .status = independent}, record);
 }
 
 // YYYYMMDD.HHNNSS in UTC of a Unix time.
@@ -253,6 +286,7 @@ IgesOutput format_iges(std::span<const OutputFace> faces, const IgesHeader& head
   if (!unit) throw GeometryError("'" + header.unit + "' is no length unit of IGES");
   double scale = 1, largest = 0;
   std::vector<OutRecord> records;
+  std::vector<int> members;
   FaceWriter writer(records);
   for (const OutputFace& face : faces) {
     // Sources with a model scale other than 1 keep their numbers, so the scale must be said again.
@@ -261,12 +295,16 @@ IgesOutput format_iges(std::span<const OutputFace> faces, const IgesHeader& head
     if (&face == &faces.front()) scale = own;
     if (own != scale) throw GeometryError("face '" + face.name + "' has another unit than the faces before it");
     largest = std::max(largest, face.face.surface.points().cwiseAbs().maxCoeff());
-    writer.add(face);
+    members.push_back(writer.add(face));
   }
+  for (const auto& [level, words] : header.levels) writer.name_level(level, words);
+  if (members.size() > 1) writer.group(members, header.product);
   IgesOutput out;
   out.largest_curve_fit = writer.largest_fit();
   const double resolution = std::max(header.resolution, out.largest_curve_fit);
-  out.text = assemble({}, global_section(header, *unit, scale, resolution, largest), records);
+  std::vector<std::string> start;
+  if (header.up) start.push_back(up_line(*header.up));
+  out.text = assemble(start, global_section(header, *unit, scale, resolution, largest), records);
   return out;
 }
 

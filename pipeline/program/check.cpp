@@ -1,7 +1,10 @@
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <memory>
 
 #include "pipeline/drape.h"
+#include "pipeline/exit_code.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/scene_arguments.h"
 
@@ -11,9 +14,13 @@ Action check_command(Command& command) {
   const auto a = std::make_shared<SceneArguments>();
   command.about("Validate a scene with its panels, without running")
       .operand("SCENE", a->input, "scene.toml")
-      .texts("--set", a->settings, "key.path=value");
+      .texts("--set KEY=VALUE", a->settings, "Override or add a scene key; may repeat")
+      .json("The verdict as JSON on stdout")
+      .example("check scene.toml", "errors name file, line and key")
+      .exits({exit_input, exit_geometry});
   return [a](const Common& common, Console& console) {
-    if (std::filesystem::path(a->input).extension() != ".toml") throw UsageError("check takes a scene.toml");
+    if (std::filesystem::path(a->input).extension() != ".toml")
+      throw UsageError(fmt::format("{0} is no scene: `toile inspect {0}` looks at panel files", a->input));
     return check_scene(scene_of(*a), common.json, console);
   };
 }

@@ -13,5 +13,8 @@ Action check_command(Command& command);
 Action study_command(Command& command);
 Action init_command(Command& command);
 Action presets_command(Command& command);
+Action schema_command(Command& command);
+Action completion_command(Command& command);
+Action help_command(Command& command);
 
 }  // namespace toile

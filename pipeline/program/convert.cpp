@@ -6,52 +6,80 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "geometry/error.h"
 #include "io/file.h"
-#include "io/panel_file.h"
 #include "pipeline/exit_code.h"
 #include "pipeline/json_text.h"
 #include "pipeline/program/commands.h"
+#include "pipeline/program/panel_argument.h"
+#include "pipeline/program/panel_choice.h"
 #include "pipeline/program/refinement.h"
 
 namespace toile {
 namespace {
 
 struct Arguments {
-  std::string input, target;
+  std::string input, target, up;
+  std::vector<std::string> only;
   RefinementArguments refinement;
+  PanelChoice choice;
 };
 
+constexpr const char* about_target =
+    "File to write: .igs; .svg (drawings at 1:1); .obj, .ply, .stl, .glb, .vtu (triangles of the cloth); .json, .csv "
+    "(control nets). Triangles and nets are in metres and in the axes of IN; GLB alone is turned, so that +Y points "
+    "up, "
+    "as its standard says. Texture coordinates: the patterns laid out in 0..1, v from the top in GLB, else from below. "
+    "\"NAME flat\" and \"NAME draped\" of a draped.igs have the same triangles, as for a morph";
+
+ConvertOptions options_of(const Arguments& a) {
+  ConvertOptions options;
+  options.refine = options_of(a.refinement);
+  options.only = a.only;
+  if (a.up.empty()) return options;
+  options.up = axis_named(a.up);
+  if (!options.up) throw UsageError(fmt::format("--up {}: must be x, y, z, -x, -y or -z", a.up));
+  return options;
+}
+
 int run(const Arguments& a, const Common& common, Console& console) {
-  std::error_code error;
-  if (!common.overwrite && std::filesystem::equivalent(a.input, a.target, error))
-    throw OutputError(fmt::format("{} is the input; give --overwrite to replace it", a.target));
-  const PanelFile file = read_panels(a.input);
-  const Conversion conversion = convert(file, a.target, options_of(a.refinement));
+  const ConvertOptions options = options_of(a);
+  const PanelFile file = read_panel_argument(a.input, a.choice);
+  for (const std::filesystem::path& path : conversion_targets(a.target)) require_free(path, common.overwrite);
+  const Conversion conversion = convert(file, a.target, options);
   for (const std::string& warning : conversion.warnings) console.warning(warning);
+  for (const std::string& detail : conversion.details) console.detail(detail);
+  for (const auto& [path, bytes] : conversion.beside) write_file(path, bytes);
   write_file(a.target, conversion.bytes);
   std::string notes;
   for (const std::string& note : conversion.notes) notes += (notes.empty() ? "" : "; ") + note;
   console.note(fmt::format("wrote {}: {}", a.target, notes));
   if (common.json) {
-    const nlohmann::ordered_json out = {{"file", utf8(a.input)},
-                                        {"output", utf8(a.target)},
-                                        {"panels", file.panels.size()},
-                                        {"bytes", conversion.bytes.size()},
-                                        {"notes", conversion.notes}};
+    const nlohmann::ordered_json out = {{"file", utf8(a.input)},       {"output", utf8(a.target)},
+                                        {"panels", conversion.panels}, {"bytes", conversion.bytes.size()},
+                                        {"notes", conversion.notes},   {"refused", conversion.refused}};
     fmt::print("{}\n", json_text(out));
   }
-  return exit_ok;
+  for (const std::string& panel : conversion.refused) console.error(panel);
+  return conversion.refused.empty() ? exit_ok : exit_geometry;
 }
 
 }  // namespace
 
 Action convert_command(Command& command) {
   const auto a = std::make_shared<Arguments>();
-  command.about("Panels to IGES, SVG (1:1), OBJ, PLY, STL, GLB or VTU, by the ending of OUT")
+  command.about("Panels to IGES, SVG (1:1), OBJ, PLY, STL, GLB, VTU, JSON or CSV, by the ending of OUT")
       .operand("IN", a->input, "IGES, pattern JSON or DXF")
-      .operand("OUT", a->target, "File to write");
+      .operand("OUT", a->target, about_target)
+      .texts("--only NAME", a->only, "The panel of this name; may repeat")
+      .text("--up AXIS", a->up, "GLB: which axis of IN points up (as draped.igs says; else z for IGES, y for patterns)")
+      .overwrite("Replace OUT where it is there")
+      .json("What was written as JSON on stdout")
+      .example("convert pattern.dxf pattern.igs", "pattern pieces as trimmed surfaces")
+      .example("convert panel.igs panel.svg", "an outline to print, 1:1")
+      .example("convert draped.igs front.glb --only 'front draped'", "one panel, for the web and for Blender")
+      .exits({exit_input, exit_geometry, exit_output});
   add_refinement(command, a->refinement);
+  add_choice(command, a->choice);
   return [a](const Common& common, Console& console) { return run(*a, common, console); };
 }
 

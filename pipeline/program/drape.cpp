@@ -1,12 +1,17 @@
 #include "pipeline/drape.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <csignal>
 #include <memory>
+#include <string>
 
-#include "pipeline/allocation_count.h"
+#include "pipeline/exit_code.h"
 #include "pipeline/program/commands.h"
+#include "pipeline/program/panel_choice.h"
 #include "pipeline/program/scene_arguments.h"
+#include "pipeline/summary.h"
 
 namespace toile {
 namespace {
@@ -17,6 +22,23 @@ struct Arguments {
   bool dry = false;
 };
 
+// The words of this call, to go on from where the run stops.
+std::string words(const Arguments& a, const Common& common) {
+  std::string out = shell_word(common.program) + " drape " + shell_word(a.scene.input);
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) out += fmt::format(" {} {}", option, shell_word(value));
+  };
+  for (const std::string& setting : a.scene.settings) add("--set", setting);
+  for (const std::string& pin : a.scene.pins) add("--pin", pin);
+  add("--until", a.scene.until);
+  add("--time-limit", a.scene.time_limit);
+  add("--fabric", a.scene.fabric);
+  add("--span", a.scene.span);
+  if (a.scene.degree > 0) add("--degree", std::to_string(a.scene.degree));
+  if (common.threads > 0) add("--threads", std::to_string(common.threads));
+  return out;
+}
+
 int run(const Arguments& a, const Common& common, Console& console) {
   Scene scene = scene_of(a.scene);
   if (a.dry) return dry_run(std::move(scene), common.json, console);
@@ -26,8 +48,8 @@ int run(const Arguments& a, const Common& common, Console& console) {
   options.json = common.json;
   std::signal(SIGPIPE, SIG_IGN);  // a reader of the messages that goes away doesn't end the run
   options.threads = std::max(1, common.threads);
-  if (allocation_count()) options.allocations = [] { return *allocation_count(); };
   if (!a.resume.empty()) options.resume = a.resume;
+  options.command = words(a, common);
   return drape(std::move(scene), options, console);
 }
 
@@ -36,19 +58,32 @@ int run(const Arguments& a, const Common& common, Console& console) {
 Action drape_command(Command& command) {
   const auto a = std::make_shared<Arguments>();
   command.about("Drape a scene, or a panel file held by --pin")
-      .operand("SCENE", a->scene.input, "scene.toml or panel.igs")
-      .text("-o,--output", a->directory, "Directory of the results (default: out/<scene name>)")
-      .texts("--set", a->scene.settings, "key.path=value, any TOML value (panel.0.grain_deg=45)")
-      .text("--until", a->scene.until, "Simulated time, s or with a unit")
+      .operand("SCENE", a->scene.input, "scene.toml, or a panel file with --pin")
+      .text("-o,--output DIR", a->directory, "Directory of the results (default: out/<scene name>)")
+      .texts("--set KEY=VALUE", a->scene.settings,
+             "Override or add a scene key, any TOML value (panel.0.grain_deg=45); may repeat")
+      .text("--until TIME", a->scene.until, "Simulated time, s or with a unit")
       .flag("--dry-run", a->dry, "Say step, time and memory; run nothing")
-      .text("--resume", a->resume, "Go on from a checkpoint of the same scene (DIR/checkpoint)")
+      .text("--resume FILE", a->resume,
+            "Go on from a checkpoint of the same scene (DIR/checkpoint); not with --dry-run")
       .excludes("--resume", "--dry-run")
-      .text("--time-limit", a->scene.time_limit,
+      .text("--time-limit TIME", a->scene.time_limit,
             "Wall time after which the run stops and leaves a checkpoint, s or with a unit")
-      .texts("--pin", a->scene.pins, "Panel files: what is held, such as curve:0,2; may repeat")
-      .integer("--degree", a->scene.degree, 2, 5, "Panel files: degree")
-      .text("--span", a->scene.span, "Panel files: longest knot span (\"20 mm\")")
-      .text("--fabric", a->scene.fabric, "Panel files: a preset");
+      .texts("--pin ADDRESS", a->scene.pins, "Panel files: what is held, such as curve:0,2; may repeat")
+      .integer("--degree N", a->scene.degree, 2, 5, "Panel files: degree")
+      .text("--span LENGTH", a->scene.span, "Panel files: longest knot span, m or with a unit (\"20 mm\")")
+      .text("--fabric NAME", a->scene.fabric, "Panel files: a preset (toile presets lists them)")
+      .overwrite("Replace the files of a former run in DIR")
+      .json("The report (or, with --dry-run, the plan) as JSON on stdout")
+      .threads("Threads (default 1); any number gives the same bytes")
+      .progress()
+      .example("drape scene.toml -o out/first", "a scene")
+      .example("drape scene.toml --dry-run", "step, time and memory of the run")
+      .example("drape scene.toml --overwrite --set fabric.cotton.drag=0.5", "one key changed")
+      .example("drape panel.igs --pin curve:0,2 --span '20 mm'", "a panel file without a scene")
+      .example("drape scene.toml -o out/first --resume out/first/checkpoint", "go on where it stopped")
+      .exits({exit_input, exit_geometry, exit_solver, exit_check, exit_time_limit, exit_output, exit_interrupted});
+  add_choice(command, a->scene.choice);
   return [a](const Common& common, Console& console) { return run(*a, common, console); };
 }
 

@@ -6,10 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file.h"
-#include "io/panel_file.h"
 #include "pipeline/exit_code.h"
 #include "pipeline/json_text.h"
 #include "pipeline/program/commands.h"
+#include "pipeline/program/panel_argument.h"
+#include "pipeline/program/panel_choice.h"
 #include "pipeline/program/refinement.h"
 
 namespace toile {
@@ -18,12 +19,14 @@ namespace {
 struct Arguments {
   std::string input, svg, png, html;
   RefinementArguments refinement;
+  PanelChoice choice;
 };
 
 int run(const Arguments& a, const Common& common, Console& console) {
   InspectOptions options = options_of(a.refinement);
   options.threads = common.threads;
-  const Inspection inspection = inspect(read_panels(a.input), options);
+  for (const std::string* target : {&a.svg, &a.png, &a.html}) require_free(*target, common.overwrite);
+  const Inspection inspection = inspect(read_panel_argument(a.input, a.choice), options);
   const auto draw = [&](const std::string& target, auto format) {
     if (target.empty()) return;
     write_file(target, format(inspection));
@@ -47,10 +50,17 @@ Action inspect_command(Command& command) {
   const auto a = std::make_shared<Arguments>();
   command.about("Entities, loops, cells and constraint points of a panel file")
       .operand("FILE", a->input, "IGES, pattern JSON or DXF")
-      .text("--svg", a->svg, "Draw the panels")
-      .text("--png", a->png, "Draw them as a picture")
-      .text("--html", a->html, "Draw them on a page with tables and warnings");
+      .text("--svg OUT", a->svg, "Draw the panels")
+      .text("--png OUT", a->png, "Draw them as a picture")
+      .text("--html OUT", a->html, "Draw them on a page with tables and warnings")
+      .json("Everything as JSON on stdout, lengths in metres")
+      .threads("Threads (default: one for each core); any number gives the same bytes")
+      .example("inspect panel.igs", "panels, loops and curves as tables")
+      .example("inspect panel.igs --svg panel.svg", "a drawing with the numbers that addresses use")
+      .example("inspect pattern.dxf --span '20 mm' --json", "cells and constraint points of that refinement")
+      .exits({exit_input, exit_geometry, exit_output});
   add_refinement(command, a->refinement);
+  add_choice(command, a->choice);
   return [a](const Common& common, Console& console) { return run(*a, common, console); };
 }
 

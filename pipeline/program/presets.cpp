@@ -36,7 +36,11 @@ int list_presets(const Common& common) {
 }  // namespace
 
 Action presets_command(Command& command) {
-  command.about("Fabrics that need no table in the scene");
+  command.about("Fabrics that need no table in the scene")
+      .json("All of their numbers as JSON on stdout")
+      .example("presets", "the list")
+      .example("drape panel.igs --pin curve:0,2 --fabric armor", "use one")
+      .exits({});
   return [](const Common& common, Console&) { return list_presets(common); };
 }
 

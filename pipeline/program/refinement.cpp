@@ -8,9 +8,9 @@
 namespace toile {
 
 void add_refinement(Command& command, RefinementArguments& a) {
-  command.integer("--degree", a.degree, 1, 5, "Degree")
-      .text("--span", a.span, "Longest knot span (\"20 mm\")")
-      .integer("--spans", a.spans, 1, 10000, "Spans per direction")
+  command.integer("--degree N", a.degree, 1, 5, "Degree (default: the file's)")
+      .text("--span LENGTH", a.span, "Longest knot span, m or with a unit (\"20 mm\")")
+      .integer("--spans N", a.spans, 1, 10000, "Spans per direction; not with --span")
       .excludes("--spans", "--span");
 }
 

@@ -4,11 +4,11 @@
 #include <nlohmann/json.hpp>
 
 #include "io/iges.h"
-#include "io/panel_file.h"
 #include "pipeline/exit_code.h"
 #include "pipeline/inspect.h"
 #include "pipeline/json_text.h"
 #include "pipeline/program/commands.h"
+#include "pipeline/program/panel_argument.h"
 
 namespace toile {
 namespace {
@@ -50,7 +50,7 @@ void print_text(const Arguments& a, const PanelFile& file, const RoundtripReport
 }
 
 int run(const Arguments& a, const Common& common) {
-  const PanelFile file = read_panels(a.input);
+  const PanelFile file = read_panel_argument(a.input);
   const RoundtripReport report = roundtrip(file, a.rewrite ? IgesMode::rewrite : IgesMode::replay);
   if (common.json) {
     print_json(a, file, report);
@@ -66,7 +66,10 @@ Action roundtrip_command(Command& command) {
   const auto a = std::make_shared<Arguments>();
   command.about("Read, write, read: is everything kept?")
       .operand("FILE", a->input, "IGES, pattern JSON or DXF")
-      .flag("--rewrite", a->rewrite, "Make every known record anew instead of replaying it");
+      .flag("--rewrite", a->rewrite, "Make every known record anew instead of replaying it")
+      .json("What was kept as JSON on stdout")
+      .example("roundtrip panel.igs", "are knots, weights, nets and parameter curves equal bit by bit?")
+      .exits({exit_input, exit_geometry, exit_check});
   return [a](const Common& common, Console&) { return run(*a, common); };
 }
 

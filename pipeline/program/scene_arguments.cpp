@@ -7,7 +7,9 @@
 
 #include "geometry/error.h"
 #include "pipeline/addresses.h"
+#include "pipeline/program/panel_argument.h"
 #include "pipeline/program/refinement.h"
+#include "pipeline/suggestion.h"
 
 namespace toile {
 namespace {
@@ -27,8 +29,14 @@ std::vector<std::string> settings_of(const SceneArguments& a) {
 QuickScene quick_request(const SceneArguments& a) {
   QuickScene quick;
   quick.file = a.input;
+  quick.choice = a.choice;
   quick.pins = a.pins;
-  if (a.pins.empty()) throw UsageError("a panel file needs at least one --pin, such as --pin curve:0,2");
+  if (a.pins.empty()) {
+    throw UsageError(fmt::format(
+        "a panel file needs at least one --pin, such as --pin curve:0,2 (loop 0, curve 2); `toile inspect {} "
+        "--svg panel.svg` shows the numbers",
+        a.input));
+  }
   for (const std::string& pin : a.pins) {
     try {
       parse_address(pin);
@@ -39,7 +47,9 @@ QuickScene quick_request(const SceneArguments& a) {
   if (!a.fabric.empty()) {
     const auto presets = fabric_presets();
     if (std::ranges::find(presets, a.fabric, &FabricPreset::name) == presets.end()) {
-      throw UsageError(fmt::format("--fabric: no preset is called '{}'; see toile presets", a.fabric));
+      std::vector<std::string> names;
+      for (const FabricPreset& preset : presets) names.push_back(preset.name);
+      throw UsageError(fmt::format("--fabric: no preset is called '{}'{}", a.fabric, suggestion(a.fabric, names)));
     }
     quick.fabric = a.fabric;
   }
@@ -53,9 +63,14 @@ QuickScene quick_request(const SceneArguments& a) {
 Scene scene_of(const SceneArguments& a) {
   const std::vector<std::string> settings = settings_of(a);
   if (std::filesystem::path(a.input).extension() != ".toml") return quick_scene(quick_request(a), settings);
-  if (!a.pins.empty() || !a.fabric.empty() || !a.span.empty() || a.degree > 0) {
-    throw UsageError("--pin, --fabric, --span and --degree are for panel files; in a scene use its keys or --set");
+  if (!a.pins.empty() || !a.fabric.empty() || !a.span.empty() || a.degree > 0 || a.choice != PanelChoice()) {
+    throw UsageError(
+        "--pin, --fabric, --span, --degree, --size, --unit and --outline are for panel files; in a scene use its keys "
+        "or "
+        "--set");
   }
+  if (toml_kind(a.input) == TomlKind::study)
+    throw InputError(fmt::format("{0} is a study: `toile study {0}` runs it", a.input));
   return read_scene(a.input, settings);
 }
 

@@ -4,12 +4,14 @@
 #include <string>
 #include <vector>
 
+#include "io/panel_file.h"
 #include "pipeline/program/command.h"
 #include "pipeline/scene.h"
 
 namespace toile {
 
 struct SceneArguments {
+  PanelChoice choice;
   std::string input;
   std::vector<std::string> settings;  // --set
   std::string until, time_limit;      // scene keys that have options of their own; empty: as the scene says

@@ -1,10 +1,15 @@
 #include "pipeline/study.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <memory>
 
+#include "geometry/error.h"
+#include "pipeline/exit_code.h"
 #include "pipeline/program/commands.h"
+#include "pipeline/program/panel_argument.h"
 
 namespace toile {
 namespace {
@@ -14,6 +19,8 @@ struct Arguments {
 };
 
 int run(const Arguments& a, const Common& common, Console& console) {
+  if (toml_kind(a.input) == TomlKind::scene)
+    throw InputError(fmt::format("{0} is a scene, not a study: `toile drape {0}` runs it", a.input));
   StudyOptions options;
   // Each run is this very program.
   options.program = std::filesystem::read_symlink("/proc/self/exe");
@@ -30,7 +37,13 @@ Action study_command(Command& command) {
   const auto a = std::make_shared<Arguments>();
   command.about("Run a scene many times: errors against time, stability tables")
       .operand("STUDY", a->input, "study.toml")
-      .text("-o,--output", a->directory, "Directory of the results (default: out/<study name>)");
+      .text("-o,--output DIR", a->directory, "Directory of the results (default: out/<study name>)")
+      .overwrite("Run again what an earlier call has run")
+      .json("study.json on stdout instead of the table")
+      .threads("Threads of each run (default 1)")
+      .progress()
+      .example("study study.toml -o out/study", "the same command goes on with an interrupted study")
+      .exits({exit_input, exit_check, exit_output, exit_interrupted});
   return [a](const Common& common, Console& console) { return run(*a, common, console); };
 }
 

@@ -2,12 +2,12 @@
 #include <cmath>
 #include <cstdio>
 
-#include "geometry/error.h"
-#include "io/file.h"
-#include "io/iges.h"
-#include "trimming/constraint_points.h"
-#include "trimming/loops.h"
-#include "trimming/quadrature.h"
+#include "toile/geometry/error.h"
+#include "toile/io/file.h"
+#include "toile/io/iges.h"
+#include "toile/trimming/constraint_points.h"
+#include "toile/trimming/loops.h"
+#include "toile/trimming/quadrature.h"
 
 int main(int argc, char** argv) try {
   if (argc < 3) return std::fputs("usage: bend_panel IN.igs OUT.igs\n", stderr), 2;

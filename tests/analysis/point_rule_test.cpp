@@ -127,6 +127,24 @@ TEST(PointRule, LinesAreAsManyAsTheRuleSays) {
     }
 }
 
+TEST(PointRule, LinesLieInTheDomainWhateverTheDegree) {
+  for (int degree = 1; degree <= 5; ++degree)
+    for (const bool closed : {false, true})
+      for (const NamedRule& named : point_rules()) {
+        const TrimmedSurface face = square(degree, 3);
+        const TrimTopology topology = trace_trims(face);
+        std::vector<ConstraintPoint> points = constraint_points(face, topology);
+        for (const ConstraintPoint& p : apply_rule(named.rule, face, topology, points, {closed, false})) {
+          EXPECT_TRUE(face.surface.u().domain().contains(p.u) && face.surface.v().domain().contains(p.v))
+              << named.name << ' ' << degree << ": " << p.u << ", " << p.v;
+        }
+      }
+  // At degree 1 the tangents are constant on each span: its middle stands for it.
+  const Lines flat = lines_of(PointRule::greville_derivative, square(1, 4));
+  EXPECT_EQ(flat.u.size(), 4u);
+  EXPECT_NEAR(*flat.u.begin(), 0.125, 1e-15);
+}
+
 TEST(PointRule, SmoothQuadraticPanelsTakeTheKnotMesh) {
   const TrimmedSurface face = square(2, 5);
   const TrimTopology topology = trace_trims(face);

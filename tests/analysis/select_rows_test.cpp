@@ -207,8 +207,11 @@ TEST(SelectRows, PinsThatContradictEachOtherAreNamed) {
     const Eigen::Vector3d place(0, 0, z);
     return PlaceRow{place_row(model, 0, u, v), number, [place](double) { return place; }};
   };
-  EXPECT_NO_THROW(select_rows(model, map, strip.points, {pin(4, 0.3, 0.5, 0), pin(7, 0.3, 0.5, 0)}));
-  EXPECT_NO_THROW(select_rows(model, map, strip.points, {pin(4, 0.3, 0.5, 0), pin(7, 0.6, 0.5, 1)}));
+  // Pins that agree, or hold different places, cost no strain row.
+  const std::size_t rows = select_rows(model, map, strip.points, {}).size();
+  EXPECT_GT(rows, 0u);
+  EXPECT_EQ(select_rows(model, map, strip.points, {pin(4, 0.3, 0.5, 0), pin(7, 0.3, 0.5, 0)}).size(), rows);
+  EXPECT_EQ(select_rows(model, map, strip.points, {pin(4, 0.3, 0.5, 0), pin(7, 0.6, 0.5, 1)}).size(), rows);
   try {
     select_rows(model, map, strip.points, {pin(2, 0.9, 0.5, 0), pin(4, 0.3, 0.5, 0), pin(7, 0.3, 0.5, 0.1)});
     FAIL() << "accepted";

@@ -20,7 +20,7 @@ struct Scene {
   Eigen::VectorXd node_mass, q;
 };
 
-// Control points without cloth are fixed; masses have the floor of design.md, 0.01 of a cell's, unless another is
+// Control points without cloth are fixed; masses have the floor of 0.01 of a cell's, unless another is
 // given.
 Scene make_scene(ShellPanel panel, const std::function<Eigen::VectorXd(const ShellModel&)>& state,
                  const std::vector<int>& pinned = {}, double mass_floor = 0.01) {
@@ -163,7 +163,7 @@ TEST(TimeStep, BoundsTheLargestEigenvalueOfTheDenseMatrix) {
       }
 }
 
-// design.md, Numerics: measured with an independent computation on uniform panels.
+// Measured with an independent computation on uniform panels.
 TEST(TimeStep, MatchesThePublishedConstants) {
   const double h = 1.0 / 16;
   for (const int degree : {2, 3}) {

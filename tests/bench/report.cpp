@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "bench/busy_cores.h"
 #include "bench/scenes.h"
 #include "geometry/error.h"
 
@@ -175,9 +176,10 @@ void growth(const std::string& samples) {
   grows("factorisation", factorisation, false);
 }
 
+constexpr int pairs = 7;  // one after the other, as a shared machine has fast and slow minutes
+
 void threads(const std::string& samples) {
   constexpr double least_gain = 1.6;
-  constexpr int pairs = 7;  // one after the other, as a shared machine has fast and slow minutes
   for (const int n : {50, 100, 316}) {
     std::vector<double> motion, projection, solution, factorisation, outside;
     int control_points = 0;
@@ -199,6 +201,24 @@ void threads(const std::string& samples) {
   }
 }
 
+// Threads that wait for each other lose where others want the cores too: by the wall time and CPU time of whole runs.
+void threads_among_others(const std::string& samples) {
+  constexpr double least = 0.9;
+  const BusyCores others;
+  for (const int n : {50, 100}) {
+    std::vector<double> wall, cpu;
+    for (int k = 0; k < pairs; ++k) {
+      const RunCost one = run_cost(samples, n, 1), two = run_cost(samples, n, 2);
+      wall.push_back(one.wall / two.wall);
+      cpu.push_back(two.cpu / one.cpu);
+    }
+    row(fmt::format("two threads over one, busy cores, {} control points", n * n), fmt::format("{:.2f}", median(wall)),
+        ">= 0.9", median(wall) >= least,
+        fmt::format("speed of steps beside a busy process on every core, median of {} pairs; CPU time {:.2f}", pairs,
+                    median(cpu)));
+  }
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -216,6 +236,7 @@ int main(int count, char** arguments) {
     kidnapped(arguments[1]);
     growth(arguments[1]);
     threads(arguments[1]);
+    threads_among_others(arguments[1]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <string>
 
 #include "geometry/clock.h"
@@ -13,6 +14,16 @@ namespace {
 
 Build kidnapped(const std::filesystem::path& samples, const std::vector<std::string>& settings) {
   return build(read_scene(samples / "kidnapped_a" / "scene.toml", settings));
+}
+
+Build kidnapped(const std::filesystem::path& samples, int per_direction) {
+  const std::string n = std::to_string(per_direction);
+  return kidnapped(samples, {"panel.0.refine.control_points=[" + n + "," + n + "]"});
+}
+
+// Bending bounds the step by h^2; half of what 8 x 8 cells allow.
+double small_step(int per_direction) {
+  return 2e-3 * std::pow(8.0 / (per_direction - 2), 2);
 }
 
 }  // namespace
@@ -50,12 +61,10 @@ std::vector<DrapeCost> kidnapped_by_step(const std::filesystem::path& samples,
 StepCost step_cost(const std::filesystem::path& samples, int per_direction, int threads) {
   constexpr double least_seconds = 0.5;
   constexpr int least_steps = 5;
-  const std::string n = std::to_string(per_direction);
-  const Build scene = kidnapped(samples, {"panel.0.refine.control_points=[" + n + "," + n + "]"});
+  const Build scene = kidnapped(samples, per_direction);
   scene.model->use_threads(threads);
   const auto system = assemble(scene, 0);
-  // Bending bounds the step by h^2; half of what 8 x 8 cells allow.
-  const double dt = 2e-3 * std::pow(8.0 / (per_direction - 2), 2);
+  const double dt = small_step(per_direction);
   StepCost cost;
   cost.control_points = per_direction * per_direction;
   cost.quadrature_points = scene.model->quadrature_points();
@@ -91,6 +100,20 @@ StepCost step_cost(const std::filesystem::path& samples, int per_direction, int 
   }
   cost.motion = median(motion);
   return cost;
+}
+
+RunCost run_cost(const std::filesystem::path& samples, int per_direction, int threads) {
+  constexpr int control_point_steps = 1000000;
+  const Build scene = kidnapped(samples, per_direction);
+  scene.model->use_threads(threads);
+  const auto system = assemble(scene, 0);
+  DynamicState state = state_from(*system, scene.start, Eigen::VectorXd::Zero(scene.start.size()), 0);
+  StepWork work;
+  const Clock::time_point begin = Clock::now();
+  const std::clock_t cpu = std::clock();
+  const int steps = control_point_steps / (per_direction * per_direction);
+  for (int k = 0; k < steps; ++k) step(system->dynamic, state, small_step(per_direction), work);
+  return {since(begin), static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC};
 }
 
 double exponent(const std::vector<double>& size, const std::vector<double>& cost) {

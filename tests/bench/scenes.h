@@ -29,6 +29,12 @@ struct StepCost {
 };
 StepCost step_cost(const std::filesystem::path& samples, int per_direction, int threads = 1);
 
+// A number of steps of the same cloth with its strain limit, all together.
+struct RunCost {
+  double wall = 0, cpu = 0;  // s
+};
+RunCost run_cost(const std::filesystem::path& samples, int per_direction, int threads);
+
 // Of several timings: what other programs on the machine took doesn't count.
 double median(std::vector<double> times);
 

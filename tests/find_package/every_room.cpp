@@ -1,8 +1,8 @@
 // every_room SCENE.toml: runs a scene for a moment through the installed libraries; the linker needs every one.
 #include <cstdio>
 
-#include "geometry/error.h"
-#include "pipeline/run.h"
+#include "toile/geometry/error.h"
+#include "toile/pipeline/run.h"
 
 int main(int argc, char** argv) try {
   if (argc != 2) return 2;

@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const toile::CpuLimit limit;
   try {
     toile::parse_dxf({reinterpret_cast<const char*>(data), size}, "fuzz.dxf");
-  } catch (const toile::InputError&) {
+  } catch (const toile::Error&) {
   }
   return 0;
 }

@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const toile::CpuLimit limit;
   try {
     toile::parse_pattern({reinterpret_cast<const char*>(data), size}, "fuzz.json");
-  } catch (const toile::InputError&) {
+  } catch (const toile::Error&) {
   }
   return 0;
 }

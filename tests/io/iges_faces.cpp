@@ -267,6 +267,43 @@ TEST(IgesFaces, AnOffsetFollowsItsFunction) {
   EXPECT_EQ(read_corpus("function_offset_130").warnings.size(), 0u);
 }
 
+// The generatrix is an arc from 300 degrees; the exporter counts it from 0, and its model curves say so.
+TEST(IgesFaces, ParametersCountAsTheModelCurvesSay) {
+  const PanelFile file = read_corpus("revolution_from_arc_start");
+  ASSERT_EQ(file.panels.size(), 1u);
+  EXPECT_TRUE(has_warning(file, "a reading under which they lie on its model curves is taken"));
+  // A zone of the sphere between the latitudes -30 and 45 degrees, 1.5 rad wide.
+  expect_near_rel(area(file.panels[0]), 10 * (10 * std::sin(pi / 4) + 10 * 0.5) * 1.5, 1e-9);
+}
+
+TEST(IgesFaces, WholeSpheresAndToriBoundThemselves) {
+  const std::vector<double> found = areas("sphere_and_torus");
+  ASSERT_EQ(found.size(), 2u);
+  expect_near_rel(found[0], 4 * pi * 21 * 21, 1e-9);
+  expect_near_rel(found[1], 4 * pi * pi * 30 * 8, 1e-9);
+}
+
+TEST(IgesFaces, MoreThanATurnIsOne) {
+  const std::vector<double> found = areas("revolution_beyond_a_turn");
+  ASSERT_EQ(found.size(), 2u);
+  expect_near_rel(found[0], 2 * pi * 30 * 50, 1e-9);
+  expect_near_rel(found[1], 30 * 50 * 0.6 * 2, 1e-9);  // trimmed where the second turn would be
+}
+
+TEST(IgesFaces, OneBoundaryMayHoldBothEndsOfATube) {
+  expect_near_rel(areas("tube_of_two_circles").at(0), 2 * pi * 10 * 20, 1e-9);
+  EXPECT_TRUE(has_warning(read_corpus("tube_of_two_circles"), "holds 2 closed chains"));
+}
+
+TEST(IgesFaces, PatchesMayPartByLessThanTheFileResolves) {
+  expect_near_rel(areas("spline_114_gap").at(0), 2, 1e-9);
+  std::string finer = test::corpus_text("spline_114_gap");
+  finer.replace(finer.find("1.E-04"), 6, "1.E-09");
+  const std::string refusal = message_of<InputError>([&] { parse_iges(finer, "finer.igs"); });
+  EXPECT_NE(refusal.find("a gap of 4"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("must be at most"), std::string::npos) << refusal;
+}
+
 TEST(IgesFaces, IdleControlPointsOfSurplusKnotsAreLeftOut) {
   const PanelFile file = read_corpus("surplus_knots");
   const NurbsSurface& s = file.panels[0].surface;

@@ -65,6 +65,10 @@ TEST(IgesReal, ReadsEveryFormThatExportersWrite) {
                                                                                {"1.5D2", 150},
                                                                                {"1.5d-02", 0.015},
                                                                                {"-1D+00", -1},
+                                                                               {"1.0+002", 100},
+                                                                               {"-2.5-003", -0.0025},
+                                                                               {".5-1", 0.05},
+                                                                               {"1.0-400", 0},
                                                                                {"1E-400", 0}}) {
     const std::optional<double> read = parse_real(text);
     ASSERT_TRUE(read) << text;
@@ -73,7 +77,8 @@ TEST(IgesReal, ReadsEveryFormThatExportersWrite) {
 }
 
 TEST(IgesReal, RefusesWhatIsNoFiniteNumber) {
-  for (const char* text : {"", "abc", "1..2", "1,5", "nan", "inf", "1E400", "0x10", "1 2", "--1", "1E"})
+  for (const char* text : {"", "abc", "1..2", "1,5", "nan", "inf", "1E400", "0x10", "1 2", "--1", "1E", "1.0+400",
+                           "1+2", "1.0+", "1.0+-2", "1.5-2.5"})
     EXPECT_FALSE(parse_real(text)) << text;
 }
 

@@ -1,14 +1,19 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <map>
+#include <set>
+#include <span>
 
 #include "geometry/error.h"
 #include "geometry/refine.h"
 #include "io/iges/cards.h"
 #include "io/iges/file.h"
 #include "io/iges/parameters.h"
+#include "io/iges/topology.h"
 #include "io/iges_corpus.h"
 #include "support/near.h"
 
@@ -268,6 +273,107 @@ TEST(IgesWriting, FacesOfDifferentUnitsAreRefused) {
   const TrimmedSurface mm = read_corpus("natural_144").panels[0], m = read_corpus("two_panels_units_m").panels[0];
   const std::vector<OutputFace> faces{{mm, "a", 0, {}}, {m, "b", 0, {}}};
   EXPECT_FALSE(message_of<GeometryError>([&] { format_iges(faces, IgesHeader{}); }).empty());
+}
+
+// Directory numbers that no group names, of entities that stand for shapes.
+std::vector<int> free_shapes(const iges::File& file) {
+  std::set<int> held;
+  for (const iges::Entry& e : file.entries) {
+    if (e.type != 402) continue;
+    iges::Parameters in(file, e);
+    for (const int member : iges::read_group(in)) held.insert(member);
+  }
+  std::vector<int> out;
+  for (const iges::Entry& e : file.entries) {
+    const bool shape = e.type == 402 || e.type == 144 || (e.type == 128 && e.subordinate == 0);
+    if (shape && held.count(e.sequence) == 0) out.push_back(e.sequence);
+  }
+  return out;
+}
+
+TEST(IgesWriting, AFileHasOneFreeShape) {
+  const TrimmedSurface trimmed = read_corpus("hole_and_composite").panels[0],
+                       whole = read_corpus("natural_144").panels[0];
+  TrimmedSurface marked = trimmed;
+  marked.marks.push_back({MarkKind::drill, {0.5, 0.5}, std::nullopt, ""});
+  const std::vector<OutputFace> faces{{trimmed, "a flat", 1, {}},
+                                      {marked, "a draped", 2, {}},
+                                      {whole, "b flat", 1, {}},
+                                      {bent(whole), "b draped", 2, {}}};
+  IgesHeader header = header_of(read_corpus("hole_and_composite"));
+  header.product = "coat";
+  const std::string text = format_iges(faces, header).text;
+  const auto file = iges::parse_file(text, "coat.igs");
+  const std::vector<int> roots = free_shapes(*file);
+  ASSERT_EQ(roots.size(), 1u);
+  const iges::Entry& group = *file->find(roots[0]);
+  EXPECT_EQ(group.type, 402);
+  EXPECT_EQ(group.form, 7);
+  iges::Parameters in(*file, group);
+  EXPECT_EQ(iges::read_group(in).size(), 4u);
+  // Ours are the same four panels, the mark on its own.
+  const PanelFile back = parse_iges(text, "coat.igs");
+  ASSERT_EQ(back.panels.size(), 4u);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(back.panels[k].name, faces[k].name);
+    EXPECT_EQ(back.panels[k].surface, faces[k].face.surface);
+    EXPECT_EQ(back.panels[k].marks.size(), k == 1 ? 1u : 0u);
+  }
+  EXPECT_TRUE(roundtrip(back, IgesMode::rewrite).exact());
+  // One face needs no group.
+  EXPECT_EQ(format_iges(std::span(faces).first(1), header).text.find("     402"), std::string::npos);
+}
+
+TEST(IgesWriting, APanelMovedAsideIsReadWhereItIs) {
+  TrimmedSurface face = read_corpus("hole_and_composite").panels[0];
+  face.marks.push_back({MarkKind::drill, {0.5, 0.5}, std::nullopt, ""});
+  const TrimmedSurface whole = read_corpus("natural_144").panels[0];
+  const std::vector<OutputFace> faces{
+      {face, "a flat", 1, {}, {-700, 0, 0}}, {bent(face), "a draped", 2, {}}, {whole, "b flat", 1, {}, {-700, 0, 0}}};
+  const std::string text = format_iges(faces, header_of(read_corpus("hole_and_composite"))).text;
+  // Others find one translation, under the face, its mark and the whole surface.
+  const auto file = iges::parse_file(text, "aside.igs");
+  std::map<int, int> moved;
+  int matrices = 0;
+  for (const iges::Entry& e : file->entries) {
+    if (e.transform != 0) ++moved[e.type];
+    if (e.type != 124) continue;
+    ++matrices;
+    iges::Parameters in(*file, e);
+    const std::vector<double> wanted{1, 0, 0, -700, 0, 1, 0, 0, 0, 0, 1, 0};
+    for (const double value : wanted) EXPECT_EQ(in.real("R"), value);
+  }
+  EXPECT_EQ(matrices, 1);
+  EXPECT_EQ(moved, (std::map<int, int>{{116, 1}, {128, 1}, {144, 1}}));
+  // We find the panels as they were, and say why.
+  const PanelFile back = parse_iges(text, "aside.igs");
+  ASSERT_EQ(back.panels.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(back.panels[k].surface, faces[k].face.surface);
+  EXPECT_LE((back.panels[0].marks.at(0).at - face.marks[0].at).norm(), 1e-9);
+  const auto said = std::ranges::find_if(back.ledger, [](const LedgerEntry& row) { return row.type == 124; });
+  EXPECT_EQ(said->disposition, Disposition::converted);
+  EXPECT_NE(said->why.find("aside"), std::string::npos);
+  for (const IgesMode mode : {IgesMode::replay, IgesMode::rewrite}) EXPECT_TRUE(roundtrip(back, mode).exact());
+}
+
+TEST(IgesWriting, LevelsSayWhatTheyHold) {
+  const TrimmedSurface face = read_corpus("hole_and_composite").panels[0];
+  const std::vector<OutputFace> faces{{face, "a flat", 1, {}}, {bent(face), "a draped", 2, {}}};
+  IgesHeader header = header_of(read_corpus("hole_and_composite"));
+  header.levels = {{1, "flat"}, {2, "draped"}};
+  const auto file = iges::parse_file(format_iges(faces, header).text, "levels.igs");
+  std::map<int, std::string> levels;
+  std::map<int, int> on_level;
+  for (const iges::Entry& e : file->entries) {
+    if (e.type == 144) ++on_level[e.level];
+    if (e.type != 406 || e.form != 3) continue;
+    iges::Parameters in(*file, e);
+    EXPECT_EQ(in.integer("NP"), 2);
+    in.integer("FC");
+    levels[e.level] = in.text("FD");
+  }
+  EXPECT_EQ(levels, header.levels);
+  EXPECT_EQ(on_level, (std::map<int, int>{{1, 1}, {2, 1}}));
 }
 
 TEST(IgesWriting, SameInputGivesSameBytes) {

@@ -104,7 +104,7 @@ TEST(Pattern, BothDialectsBecomePanelsInTheFilesOrder) {
   const Pattern bodice = read_corpus("bodice_and_cuff.json");
   EXPECT_TRUE(bodice.soles_at_zero);
   ASSERT_EQ(bodice.stitches.size(), 2u);
-  EXPECT_EQ(bodice.stitches[1].a.curve, 5);
+  EXPECT_EQ(bodice.stitches[1].a.at(0).curve, 5);
   EXPECT_EQ(bodice.places[1].rotate_deg, Eigen::Vector3d(0, 180, 0));
   EXPECT_TRUE(bodice.file.warnings.empty());
 }
@@ -150,11 +150,127 @@ TEST(Pattern, AnEdgeAgainstItsNeighboursIsTurned) {
   expect_near_rel(area(pattern.file.panels[1]) * 1e-6, 180 * 180 / 9e4, 1e-14);
 }
 
+// Squares of 40 from left to right, called a, b, c, ...; edge 1 of each lies at edge 3 of the next.
+std::string squares(int count, const std::string& stitches, const std::string& odd_panel = "") {
+  std::string panels;
+  for (int k = 0; k < count; ++k) {
+    panels += std::string(k ? ",\n" : "") + "\"" + static_cast<char>('a' + k) +
+              "\": {\"vertices\": [[0, 0], [40, 0], [40, 40], [0, 40]], \"edges\": [{\"endpoints\": [0, 1]}, "
+              "{\"endpoints\": [1, 2]}, {\"endpoints\": [2, 3]}, {\"endpoints\": [3, 0]}]}";
+  }
+  return "{\"properties\": {\"units_in_meter\": 100}, \"pattern\": {\"panels\": {" + panels + odd_panel +
+         "},\n\"stitches\": [" + stitches + "]}}";
+}
+std::string edge(const std::string& panel, int number) {
+  return "{\"panel\": \"" + panel + "\", \"edge\": " + std::to_string(number) + "}";
+}
+
+TEST(Pattern, AStitchJoinsTheStartOfOneEdgeToTheEndOfTheOther) {
+  const Pattern plain = parse_pattern(squares(2, "[" + edge("a", 1) + "," + edge("b", 3) + "]"), "s.json");
+  EXPECT_TRUE(plain.stitches.at(0).reverse);
+  EXPECT_TRUE(plain.file.warnings.empty()) << plain.file.warnings[0];
+  const Pattern wrong =
+      parse_pattern(squares(2, "[" + edge("a", 1) + "," + edge("b", 3) + ", \"right_wrong\"]"), "s.json");
+  EXPECT_FALSE(wrong.stitches.at(0).reverse);
+  EXPECT_TRUE(wrong.file.warnings.empty());
+}
+
+TEST(Pattern, AGarmentIsGluedAndWhatIsNoSurfaceIsNamed) {
+  const auto pair = [](const std::string& a, int i, const std::string& b, int j) {
+    return "[" + edge(a, i) + "," + edge(b, j) + "]";
+  };
+  // A ring of three.
+  const std::string ring = pair("a", 1, "b", 3) + "," + pair("b", 1, "c", 3) + "," + pair("c", 1, "a", 3);
+  const Pattern tube = parse_pattern(squares(3, ring), "s.json");
+  EXPECT_TRUE(tube.file.warnings.empty());
+  ASSERT_EQ(tube.gluing.pieces.size(), 1u);
+  EXPECT_EQ(tube.gluing.pieces[0].euler, 0);
+  EXPECT_EQ(tube.gluing.pieces[0].borders, 2);
+  EXPECT_TRUE(tube.gluing.pieces[0].orientable);
+  ASSERT_EQ(tube.file.notes.size(), 1u);
+  EXPECT_NE(tube.file.notes[0].find("Euler characteristic 0, 2 borders, orientable"), std::string::npos);
+  // The last panel mirrored, drawn clockwise as such files have it: still an orientable tube.
+  std::string mirrored = squares(3, ring);
+  mirrored.replace(mirrored.rfind("[[0, 0], [40, 0], [40, 40], [0, 40]]"), 36, "[[40, 0], [0, 0], [0, 40], [40, 40]]");
+  EXPECT_TRUE(parse_pattern(mirrored, "s.json").gluing.pieces.at(0).orientable);
+  // Both ends of the band at one side's hems: a half twist.
+  const Pattern twisted =
+      parse_pattern(squares(2, pair("a", 1, "b", 3) + "," + "[" + edge("b", 1) + "," + edge("a", 3) + "]"), "s.json");
+  EXPECT_TRUE(twisted.gluing.pieces.at(0).orientable);
+  const Pattern dart =
+      parse_pattern(squares(1, "[" + edge("a", 0) + "," + edge("a", 1) + ", \"left_right\"]"), "s.json");
+  ASSERT_EQ(dart.file.warnings.size(), 1u);
+  EXPECT_NE(dart.file.warnings[0].find("the word \"left_right\" is not known"), std::string::npos);
+  const Pattern thrice = parse_pattern(squares(3, pair("a", 1, "b", 3) + "," + pair("a", 1, "c", 3)), "s.json");
+  ASSERT_EQ(thrice.file.warnings.size(), 1u);
+  EXPECT_NE(thrice.file.warnings[0].find("stitch 1: curve 0,1 of panel 'a' is sewn more than once (stitches 0, 1)"),
+            std::string::npos)
+      << thrice.file.warnings[0];
+}
+
+TEST(Pattern, OneEdgeIsSewnToSeveral) {
+  // b and c are half as wide: their bottoms to a's top, from right to left as a's top runs.
+  std::string text = squares(3, "[" + edge("a", 2) + "," + edge("b", 0) + "," + edge("c", 0) + "]");
+  for (int k = 0; k < 2; ++k)
+    text.replace(text.rfind("[[0, 0], [40, 0], [40, 40], [0, 40]]"), 36, "[[0, 0], [20, 0], [20, 30], [0, 30]]");
+  const Pattern pattern = parse_pattern(text, "s.json");
+  EXPECT_TRUE(pattern.file.warnings.empty());
+  ASSERT_EQ(pattern.stitches.size(), 1u);
+  EXPECT_EQ(pattern.stitches[0].a.size(), 1u);
+  EXPECT_EQ(pattern.stitches[0].b.size(), 2u);
+  EXPECT_EQ(pattern.gluing.pieces.at(0).euler, 1);
+  EXPECT_EQ(pattern.gluing.pieces.at(0).borders, 1);
+  // The one may stand last: its length says so.
+  text.replace(text.rfind(edge("a", 2)), edge("a", 2).size(), "X");
+  text.replace(text.rfind(edge("c", 0)), edge("c", 0).size(), edge("a", 2));
+  text.replace(text.rfind("X"), 1, edge("c", 0));
+  EXPECT_EQ(parse_pattern(text, "s.json").stitches.at(0).a.at(0).panel, 0);
+}
+
+TEST(Pattern, ABadPanelIsLeftOutAndNamed) {
+  const std::string bow =
+      ",\n\"bow\": {\"vertices\": [[0, 0], [40, 0], [0, 60], [40, 60]], \"edges\": [{\"endpoints\": [0, 1]}, "
+      "{\"endpoints\": [1, 2]}, {\"endpoints\": [2, 3]}, {\"endpoints\": [3, 0]}]}";
+  const Pattern pattern = parse_pattern(
+      squares(2, "[" + edge("a", 1) + "," + edge("bow", 3) + "],[" + edge("a", 3) + "," + edge("b", 1) + "]", bow),
+      "s.json");
+  EXPECT_EQ(pattern.file.panels.size(), 2u);
+  ASSERT_EQ(pattern.file.refused.size(), 1u);
+  EXPECT_EQ(pattern.file.refused[0],
+            "s.json:3: panel 'bow': the outline crosses itself at (20, 30); the smaller loop there measures 40 x 30");
+  EXPECT_EQ(pattern.stitches.size(), 1u) << "what is sewn to it goes with it";
+  EXPECT_EQ(pattern.file.warnings.size(), 1u);
+  std::string open = bow;
+  open.replace(open.find(", {\"endpoints\": [3, 0]}"), 23, "");
+  EXPECT_NE(parse_pattern(squares(1, "", open), "s.json").file.refused.at(0).find("its edges don't close"),
+            std::string::npos);
+  // Alone it is an error, of geometry.
+  std::string alone = squares(0, "", bow);
+  alone.replace(alone.find(",\n\"bow"), 2, "");
+  EXPECT_THROW(parse_pattern(alone, "s.json"), GeometryError);
+}
+
+TEST(Pattern, AnEdgeDrawnOutAndBackIsASlit) {
+  std::string text = squares(1, "");
+  text.replace(text.find("[40, 40]"), 8, "[40, 40], [40, 20], [30, 20]");
+  text.replace(text.find("{\"endpoints\": [1, 2]}"), 21,
+               "{\"endpoints\": [1, 3]}, {\"endpoints\": [3, 4]}, {\"endpoints\": [4, 3]}, {\"endpoints\": [3, 2]}");
+  text.replace(text.find("[2, 3]}"), 7, "[2, 5]}");
+  text.replace(text.find("[3, 0]}"), 7, "[5, 0]}");
+  const PanelFile file = parse_pattern(text, "s.json").file;
+  EXPECT_TRUE(file.refused.empty()) << file.refused[0];
+  expect_near_rel(area(file.panels.at(0)), 400 * 400, 1e-14);
+  ASSERT_EQ(file.panels[0].marks.size(), 1u);
+  EXPECT_EQ(file.panels[0].marks[0].kind, MarkKind::slit);
+  EXPECT_EQ(file.panels[0].loops[0].curves[2].index, 4) << "curves keep the numbers of their edges";
+  EXPECT_NE(file.warnings.at(0).find("drawn out and back, 10 long"), std::string::npos) << file.warnings[0];
+}
+
 void expect_error(const std::string& text, const std::string& message) {
   try {
     parse_pattern(text, "p.json");
     ADD_FAILURE() << "accepted: " << text;
-  } catch (const InputError& error) {
+  } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find(message), std::string::npos) << error.what();
   }
 }
@@ -180,7 +296,7 @@ TEST(Pattern, WhatIsWrongIsNamedWithItsLine) {
                "p.json:4: panel 'p': edge 0: an endpoint is 1, must be a whole number from 0");
   expect_error(with("[[0, 0], [8, 4]]", "[]"), "the panel has no vertices");
   expect_error(with("[8, 4]]", "[8, 0]]").replace(good.find("[0.5"), 11, "null"),
-               "p.json:2: panel 'p': the outline is 8 wide and 0 high");
+               "p.json:2: panel 'p': its edges enclose nothing");
   expect_error(with("{\"endpoints\": [1, 0]}", "{\"endpoints\": [1, 1]}"), "its edges don't close: they end at (8, 4)");
   expect_error(with("100", "0"), "'units_in_meter' is 0, must be positive");
   expect_error(with("\"p\": {", "\"p\": {}, \"p\": {"), "key 'p' stands twice");
@@ -219,7 +335,7 @@ TEST(Pattern, FlippedBytesGivePanelsOrErrors) {
       try {
         parse_pattern(test::flipped(source, "0123456789.,:[]{}\"-eE ntfu", random), "flipped.json");
         ++read;
-      } catch (const InputError&) {
+      } catch (const Error&) {
         ++refused;
       }
     }

@@ -6,12 +6,15 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <regex>
 
 #include "geometry/error.h"
 #include "geometry/refine.h"
 #include "io/file.h"
+#include "io/mesh_files.h"
 #include "io/obj.h"
 #include "io/polyline.h"
 #include "io/vtu.h"
@@ -175,6 +178,7 @@ TEST(Vtu, TrianglesLieOnTheSurfaceAndCarryTheirFields) {
     const SurfaceJet jet = evaluate(draped.surface, p[0], p[1]);
     EXPECT_NEAR(vtu.vector("normal", k).dot(jet.u.cross(jet.v).normalized()), 1, 1e-6);
     EXPECT_EQ(vtu["strain_weft"][k], float(draped.panel.fields.strain[k][0]));
+    EXPECT_EQ(vtu["strain"][k], std::max(vtu["strain_weft"][k], vtu["strain_warp"][k]));
     EXPECT_EQ(vtu["strain_shear"][k], float(draped.panel.fields.strain[k][2]));
     EXPECT_EQ(vtu["second_pk_warp"][k], float(draped.panel.fields.second_pk[k][1]));
     EXPECT_EQ(vtu["nominal_stress_weft"][k], float(draped.panel.fields.nominal[k][0]));
@@ -267,16 +271,82 @@ TEST(VtuSink, TheCollectionNamesOnlyFilesThatAreThere) {
   VtuSink sink(folder.path, "skirt");
   for (int k = 0; k < 3; ++k) {
     sink.write(draped.frame(k, k / 30.0));
-    const std::string collection = read_file(folder.path / "skirt.pvd");
-    const auto frames = files_named_in(collection);
-    ASSERT_EQ(frames.size(), std::size_t(k + 1));
-    for (const std::string& frame : frames)
-      for (const std::string& part : files_named_in(read_file(folder.path / frame)))
-        EXPECT_TRUE(std::filesystem::exists(folder.path / part)) << part;
-    EXPECT_NE(
-        collection.find("timestep=\"" + std::string(k ? k == 1 ? "0.03333333333333333" : "0.06666666666666667" : "0")),
-        std::string::npos);
+    for (const char* name : {"skirt.pvd", "skirt_parts.pvd"}) {
+      const std::string collection = read_file(folder.path / name);
+      const auto frames = files_named_in(collection);
+      ASSERT_EQ(frames.size(), std::size_t(k + 1));
+      for (const std::string& frame : frames) EXPECT_TRUE(std::filesystem::exists(folder.path / frame)) << frame;
+      EXPECT_NE(collection.find("timestep=\"" +
+                                std::string(k ? k == 1 ? "0.03333333333333333" : "0.06666666666666667" : "0")),
+                std::string::npos);
+    }
   }
+}
+
+TEST(VtuSink, TheFirstIndexShowsTheColouredClothAloneTheSecondAllParts) {
+  const Folder folder;
+  const test::Draped draped;
+  VtuSink(folder.path, "skirt").write(draped.frame(0));
+  const auto cloth = files_named_in(read_file(folder.path / "skirt.pvd"));
+  EXPECT_EQ(cloth, (std::vector<std::string>{"skirt_0000/triangles.vtu"}));
+  const std::string bytes = read_file(folder.path / cloth[0]);
+  EXPECT_NE(bytes.find("<PointData Scalars=\"strain\" Normals=\"normal\">"), std::string::npos);
+  const auto frames = files_named_in(read_file(folder.path / "skirt_parts.pvd"));
+  ASSERT_EQ(frames.size(), 1u);
+  const auto parts = files_named_in(read_file(folder.path / frames[0]));
+  EXPECT_EQ(parts.size(), 5u);
+  for (const std::string& part : parts) EXPECT_TRUE(std::filesystem::exists(folder.path / part)) << part;
+  // Nothing else lies there: the file in which the next index grows is gone with the sink.
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path))
+    EXPECT_NE(entry.path().filename().string()[0], '.') << entry.path();
+}
+
+// Bytes that this process has handed to the system for writing.
+long written_so_far() {
+  std::istringstream in(read_file("/proc/self/io"));
+  std::string word;
+  long value = 0;
+  while (in >> word >> value)
+    if (word == "wchar:") return value;
+  return -1;
+}
+
+TEST(PvdIndex, AnAppendWritesNoMoreAtTheThousandthFrameThanAtTheFirst) {
+  const Folder folder;
+  std::filesystem::create_directories(folder.path);
+  PvdIndex index(folder.path / "skirt.pvd");
+  long early = 0, late = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const long before = written_so_far();
+    index.append({k / 30.0, "skirt_" + std::to_string(1000 + k) + ".vtm"});
+    const long took = written_so_far() - before;
+    if (k >= 2 && k < 102) early += took;
+    if (k >= 1900) late += took;
+    if (k % 100 != 0 && k < 1995) continue;
+    // Whole and in order at any time.
+    const std::string text = read_file(folder.path / "skirt.pvd");
+    EXPECT_TRUE(text.ends_with("</Collection>\n</VTKFile>\n"));
+    const auto files = files_named_in(text);
+    ASSERT_EQ(files.size(), std::size_t(k + 1));
+    EXPECT_EQ(files.front(), "skirt_1000.vtm");
+    EXPECT_EQ(files.back(), "skirt_" + std::to_string(1000 + k) + ".vtm");
+  }
+  ASSERT_GT(early, 0);
+  EXPECT_LT(10 * late, 11 * early);
+}
+
+// A reader that opened an index goes on reading that index, whatever is appended meanwhile.
+TEST(PvdIndex, AReaderKeepsAWholeFile) {
+  const Folder folder;
+  std::filesystem::create_directories(folder.path);
+  PvdIndex index(folder.path / "skirt.pvd");
+  for (int k = 0; k < 5; ++k) index.append({double(k), "a.vtu"});
+  std::ifstream reader(folder.path / "skirt.pvd");
+  const std::string before = read_file(folder.path / "skirt.pvd");
+  index.append({5, "b.vtu"});
+  const std::string seen{std::istreambuf_iterator<char>(reader), {}};
+  EXPECT_EQ(seen, before);
+  EXPECT_EQ(files_named_in(read_file(folder.path / "skirt.pvd")).size(), 6u);
 }
 
 TEST(VtuSink, TakesFramesOnceAndInOrder) {
@@ -328,35 +398,44 @@ TEST(Polyline, FollowsTheTrimWithinItsChord) {
   EXPECT_LT(worst, 1.5e-3 * 1.4);
 }
 
-TEST(Obj, HoldsTheTrianglesInMetres) {
+TEST(FileSink, ObjHoldsTheTrianglesInMetres) {
   const Folder folder;
   const test::Draped draped;
-  ObjSink sink(folder.path);
+  FileSink sink(folder.path, ".obj", [](const Frame& frame) { return format_obj(frame, "cloth.mtl"); });
   EXPECT_THROW(sink.write(draped.frame(2)), std::logic_error);
   sink.write(draped.frame(0));
   std::istringstream in(read_file(folder.path / "frame_0000.obj"));
   std::string line, word;
-  std::size_t vertices = 0, faces = 0, groups = 0;
+  std::size_t vertices = 0, normals = 0, faces = 0, objects = 0;
   while (std::getline(in, line)) {
     std::istringstream words(line);
     words >> word;
-    if (word == "g") ++groups;
+    if (word == "o") ++objects;
     if (word == "v") {
       Eigen::Vector3d x;
       words >> x[0] >> x[1] >> x[2];
       const Eigen::Vector2d p = draped.triangles.uv[vertices++];
       ASSERT_EQ(x, draped.surface(p[0], p[1]));
     }
+    if (word == "vn") {
+      Eigen::Vector3d n;
+      words >> n[0] >> n[1] >> n[2];
+      const Eigen::Vector2d p = draped.triangles.uv[normals++];
+      const SurfaceJet jet = evaluate(draped.surface, p[0], p[1]);
+      ASSERT_LT((n - jet.u.cross(jet.v).normalized()).norm(), 1e-6);
+    }
     if (word == "f") {
       const auto& t = draped.triangles.triangles[faces++];
       for (const int vertex : t) {
         words >> word;
-        ASSERT_EQ(word, std::to_string(vertex + 1) + '/' + std::to_string(vertex + 1));
+        const std::string index = std::to_string(vertex + 1);
+        ASSERT_EQ(word, index + '/' + index + '/' + index);
       }
     }
   }
-  EXPECT_EQ(groups, 1u);
+  EXPECT_EQ(objects, 1u);
   EXPECT_EQ(vertices, draped.triangles.uv.size());
+  EXPECT_EQ(normals, vertices);
   EXPECT_EQ(faces, draped.triangles.triangles.size());
 }
 

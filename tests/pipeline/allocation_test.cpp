@@ -4,13 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/allocation_count.h"
 #include "pipeline/panels.h"
 #include "pipeline/run.h"
+#include "support/allocation_count.h"
 
 namespace toile {
 namespace {
 
+using test::allocation_count;
 using test::Folder;
 
 // Allocations of each step of a run without frames on the way, with a step that needs no bound.

@@ -1,9 +1,11 @@
 // `toile inspect` as functions: the contract of the JSON, the table and the drawing.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <regex>
 
 #include "geometry/error.h"
 #include "pipeline/inspect.h"
@@ -64,8 +66,8 @@ TEST(Inspect, AFaceWithoutATrimHasEveryKnotVertexAndNothingElse) {
 
 TEST(Inspect, JsonHasTheFieldsOfTheContract) {
   const auto json = inspect_json(inspect(flat_panel(true)));
-  EXPECT_EQ(keys(json), (std::vector<std::string>{"file", "unit", "exporter", "warnings", "entities", "panels",
-                                                  "refused", "ledger"}));
+  EXPECT_EQ(keys(json), (std::vector<std::string>{"file", "unit", "exporter", "warnings", "size", "sizes", "notes",
+                                                  "entities", "panels", "refused", "ledger"}));
   EXPECT_EQ(json.at("entities"), (nlohmann::ordered_json{{"128", 1}, {"144", 1}}));
   const auto& panel = json.at("panels").at(0);
   EXPECT_EQ(keys(panel), (std::vector<std::string>{"name", "degree", "control_points", "rational", "knots", "domain",
@@ -175,7 +177,8 @@ TEST(Inspect, NamesInAnyEncodingBecomeJson) {
   EXPECT_EQ(json.at("panels").at(0).at("name"), "caf\xc3\xa9");
   for (const char* broken : {"\xc0\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe2\x82", "\xff"}) {
     file.exporter = broken;
-    EXPECT_NO_THROW((void)inspect_json(inspect(file)).dump());
+    const std::string text = inspect_json(inspect(file)).dump();  // throws where a string isn't UTF-8
+    EXPECT_NE(nlohmann::json::parse(text).at("exporter"), "") << text;
   }
 }
 
@@ -183,6 +186,32 @@ std::size_t count(const std::string& text, const std::string& part) {
   std::size_t n = 0;
   for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size())) ++n;
   return n;
+}
+
+TEST(Inspect, PagesAndDrawingsKeepLettersAndLines) {
+  PanelFile file = flat_panel(true);
+  file.panels.front().name =
+      "R\xc3\xbc"
+      "ckenteil \xe5\x90\x8e\xe7\x89\x87";
+  file.exporter = "caf\xe9";  // Latin-1
+  const Inspection inspection = inspect(file);
+  const std::string page = inspect_html(inspection), svg = inspect_svg(inspection);
+  EXPECT_NE(svg.find("R\xc3\xbc"
+                     "ckenteil \xe5\x90\x8e\xe7\x89\x87</text>"),
+            std::string::npos);
+  EXPECT_NE(page.find("R\xc3\xbc"
+                      "ckenteil \xe5\x90\x8e\xe7\x89\x87"),
+            std::string::npos);
+  EXPECT_NE(page.find("caf\xc3\xa9"), std::string::npos);
+  // The ledger stays a table.
+  std::vector<LedgerEntry> ledger{{1, 5, 128, 0, Disposition::read, ""}, {3, 7, 144, 0, Disposition::read, ""}};
+  Inspection with_ledger = inspect(file);
+  with_ledger.ledger = ledger;
+  const std::string pre = inspect_html(with_ledger);
+  const std::size_t begin = pre.find("<pre>"), end = pre.find("</pre>");
+  ASSERT_LT(begin, end);
+  EXPECT_EQ(count(pre.substr(begin, end - begin), "\n"), count(ledger_text(ledger), "\n"));
+  EXPECT_EQ(pre.substr(begin, end - begin).find('?'), std::string::npos);
 }
 
 TEST(Inspect, TheTableAddressesCurvesAndListsPoints) {
@@ -202,7 +231,7 @@ TEST(Inspect, TheDrawingIsXmlWithNumbersCornersAndPoints) {
        {">0,0<", ">0,3<", ">1,1<", ">corner:0,0<", ">corner:1,1<", ">u<", ">v<", ">warp<", ">weft<"}) {
     EXPECT_NE(svg.find(words), std::string::npos) << words;
   }
-  EXPECT_NE(svg.find("a &lt; b &amp; &quot;c&quot;??"), std::string::npos);
+  EXPECT_NE(svg.find("a &lt; b &amp; &quot;c&quot;?\xc3\xbf"), std::string::npos);
   // Tags nest: every element is closed, by itself or later.
   EXPECT_EQ(count(svg, "<g>"), count(svg, "</g>"));
   EXPECT_EQ(count(svg, "<text"), count(svg, "</text>"));
@@ -214,6 +243,43 @@ TEST(Inspect, TheDrawingIsXmlWithNumbersCornersAndPoints) {
   EXPECT_EQ(count(svg, "<circle fill=\"#2166ac\"") + count(svg, "<circle fill=\"#ffffff\" stroke=\"#2166ac\""),
             vertices + 2);
   EXPECT_EQ(svg, inspect_svg(inspect(file)));
+}
+
+// Text of the drawing with the boxes that it takes at least.
+struct Words {
+  std::string text;
+  Eigen::AlignedBox2d box;
+};
+std::vector<Words> words_of(const std::string& svg) {
+  std::vector<Words> out;
+  const std::regex element(
+      "<text[^>]* x=\"([-0-9.]+)\" y=\"([-0-9.]+)\" font-size=\"([0-9.]+)\" text-anchor=\"(\\w+)\">([^<]*)</text>");
+  for (std::sregex_iterator it(svg.begin(), svg.end(), element), end; it != end; ++it) {
+    const double x = std::stod((*it)[1]), y = std::stod((*it)[2]), size = std::stod((*it)[3]);
+    const std::string anchor = (*it)[4], text = (*it)[5];
+    const double width = 0.5 * size * double(text.size());
+    const double left = anchor == "start" ? x : anchor == "middle" ? x - width / 2 : x - width;
+    out.push_back({text, {Eigen::Vector2d(left, y - 0.7 * size), Eigen::Vector2d(left + width, y)}});
+  }
+  return out;
+}
+
+TEST(Inspect, LabelsOfNarrowPanelsKeepApart) {
+  PanelFile file = flat_panel(false);
+  const KnotVector knots = uniform_knots(2, 5);
+  TrimmedSurface strap =
+      untrimmed(rebuild(AffinePatch{{0, 0, 0}, {0.03, 0, 0}, {0, 1, 0}}, knots, uniform_knots(2, 40)));
+  strap.metres_per_unit = 1;
+  file.panels.clear();
+  for (const char* name : {"strap", "a strap with a name that is longer than the panel is wide", "strap 3"}) {
+    strap.name = name;
+    file.panels.push_back(strap);
+  }
+  const std::vector<Words> words = words_of(inspect_svg(inspect(file)));
+  ASSERT_GT(words.size(), 3u * 8);
+  for (std::size_t k = 0; k < words.size(); ++k)
+    for (std::size_t i = 0; i < k; ++i)
+      EXPECT_FALSE(words[k].box.intersects(words[i].box)) << words[i].text << " and " << words[k].text;
 }
 
 }  // namespace

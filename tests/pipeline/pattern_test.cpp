@@ -9,6 +9,7 @@
 
 #include "geometry/error.h"
 #include "io/panel_file.h"
+#include "pipeline/body_fit.h"
 #include "pipeline/build.h"
 #include "pipeline/convert.h"
 #include "pipeline/panels.h"
@@ -47,26 +48,156 @@ int run(const Folder& folder, const std::string& arguments) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-TEST(PatternScene, SeamsRunSoThatPlacedEndsMeet) {
-  const Pattern skirt = parse_pattern(skirt_text(), "skirt.jsonc");
-  for (const Stitch& stitch : skirt.stitches) {
-    EXPECT_TRUE(seam_direction(skirt, stitch).reverse);
-    EXPECT_FALSE(seam_direction(skirt, stitch).doubt);
+// Squares of 40 cm called a, b, c.
+std::string squares(const std::string& stitches, const std::string& more = "") {
+  std::string panels;
+  for (const char* name : {"a", "b", "c"}) {
+    panels += std::string(panels.empty() ? "" : ", ") + "\"" + name +
+              "\": {\"vertices\": [[0, 0], [40, 0], [40, 40], [0, 40]], \"edges\": [{\"endpoints\": [0, 1]}, "
+              "{\"endpoints\": [1, 2]}, {\"endpoints\": [2, 3]}, {\"endpoints\": [3, 0]}]}";
   }
-  // The back turned about y: its other side, which runs downwards as well, now lies at the front's edge 1.
-  std::string text = replaced(skirt_text(), "\"translation\": [0, 0, -60], \"rotation\": [0, 0, 0]",
-                              "\"translation\": [0, 0, -60], \"rotation\": [0, 180, 0]");
-  text = replaced(text, "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 3}",
-                  "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 1}");
-  const Pattern turned = parse_pattern(text, "turned.jsonc");
-  EXPECT_FALSE(seam_direction(turned, turned.stitches[0]).reverse);
-  EXPECT_FALSE(seam_direction(turned, turned.stitches[0]).doubt);
-  // A waist to a hem that lies across: neither way is nearer.
-  text = replaced(skirt_text(), "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 3}",
-                  "\"edge\": 1}, {\"panel\": \"back\", \"edge\": 2}");
-  text = replaced(text, "[0, 0, -60], \"rotation\": [0, 0, 0]", "[0, 900, -60], \"rotation\": [90, 90, 0]");
-  const Pattern across = parse_pattern(text, "across.jsonc");
-  EXPECT_TRUE(seam_direction(across, across.stitches[0]).doubt);
+  return "{\"properties\": {\"units_in_meter\": 100}, \"pattern\": {\"panels\": {" + panels + more +
+         "}, \"stitches\": [" + stitches + "]}}";
+}
+std::string edge(const std::string& panel, int number) {
+  return "{\"panel\": \"" + panel + "\", \"edge\": " + std::to_string(number) + "}";
+}
+const std::string bow =
+    ", \"bow\": {\"vertices\": [[0, 0], [40, 0], [0, 60], [40, 60]], \"edges\": [{\"endpoints\": [0, 1]}, "
+    "{\"endpoints\": [1, 2]}, {\"endpoints\": [2, 3]}, {\"endpoints\": [3, 0]}]}";
+
+TEST(PatternScene, SeamsRunAsTheirStitchesSay) {
+  const Folder folder("seams");
+  const auto scene = [&](const std::string& text) {
+    write_file(folder / "p.json", text);
+    return parse_scene(pattern_scene(folder / "p.json", {}, folder / "scene.toml").text, folder / "scene.toml");
+  };
+  // The panels lie on each other: placement says nothing, the format does.
+  Scene plain = scene(squares("[" + edge("a", 1) + "," + edge("b", 3) + "], [" + edge("b", 1) + "," + edge("c", 3) +
+                              ", \"right_wrong\"]"));
+  ASSERT_EQ(plain.seams.size(), 2u);
+  EXPECT_TRUE(plain.seams[0].b.reverse);
+  EXPECT_FALSE(plain.seams[1].b.reverse);
+}
+
+TEST(PatternScene, OneEdgeSewnToSeveralIsASeamOfCurvesOrOfShares) {
+  const Folder folder("several");
+  const auto scene = [&](const std::string& text) {
+    write_file(folder / "p.json", text);
+    return parse_scene(pattern_scene(folder / "p.json", {}, folder / "scene.toml").text, folder / "scene.toml");
+  };
+  // Two edges of one panel: one seam.
+  const Scene one = scene(squares("[" + edge("a", 2) + "," + edge("b", 0) + "," + edge("b", 1) + "]"));
+  ASSERT_EQ(one.seams.size(), 1u);
+  EXPECT_EQ(one.seams[0].b.curves, (std::vector<int>{0, 1}));
+  EXPECT_TRUE(one.seams[0].b.reverse);
+  // Of two panels: each to its share, from the end of a's edge on, for the first begins where a's edge ends.
+  const Scene two = scene(squares("[" + edge("a", 2) + "," + edge("b", 0) + "," + edge("c", 0) + "]"));
+  ASSERT_EQ(two.seams.size(), 2u);
+  EXPECT_EQ(two.seams[0].b.panel, "b");
+  EXPECT_NEAR(two.seams[0].a.from, 0.5, 1e-9);
+  EXPECT_NEAR(two.seams[0].a.to, 1, 1e-9);
+  EXPECT_NEAR(two.seams[1].a.to, 0.5, 1e-9);
+  EXPECT_TRUE(two.seams[1].b.reverse);
+}
+
+TEST(PatternScene, EveryCommandLeavesOutTheSamePanel) {
+  const Folder folder("refused");
+  write_file(folder / "p.json", squares("", bow));
+  for (const char* command : {"inspect p.json", "convert p.json p.igs", "init --pattern p.json -o scene.toml"}) {
+    EXPECT_EQ(run(folder, command), 4) << command;
+    EXPECT_NE(read_file(folder / "stderr.txt").find("panel 'bow': the outline crosses itself at (20, 30)"),
+              std::string::npos)
+        << command;
+  }
+  EXPECT_EQ(read_panels(folder / "p.igs").panels.size(), 3u) << "the others are written";
+  EXPECT_EQ(run(folder, "check scene.toml"), 0) << read_file(folder / "stderr.txt");
+  write_file(folder / "bad.toml", "[[panel]]\nname = \"bow\"\npattern = \"p.json\"\n[[pin]]\nat = \"curve:0,0\"\n");
+  EXPECT_EQ(run(folder, "check bad.toml"), 3);
+  EXPECT_NE(read_file(folder / "stderr.txt").find("crosses itself"), std::string::npos);
+  // Alone there is nothing to go on with, and nothing is written.
+  std::string alone = squares("", bow);
+  alone.erase(alone.find("\"a\": {"), alone.find("\"bow\"") - alone.find("\"a\": {"));
+  write_file(folder / "alone.json", alone);
+  for (const char* command :
+       {"inspect alone.json", "convert alone.json alone.igs", "init --pattern alone.json -o alone.toml"})
+    EXPECT_EQ(run(folder, command), 4) << command;
+  EXPECT_FALSE(std::filesystem::exists(folder / "alone.igs"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "alone.toml"));
+}
+
+TEST(PatternScene, AFaultlessPatternGivesNoWarning) {
+  const Folder folder("faultless");
+  write_file(folder / "p.json", squares("[" + edge("a", 1) + "," + edge("b", 3) + "]"));
+  ASSERT_EQ(run(folder, "init --pattern p.json -o scene.toml"), 0);
+  EXPECT_EQ(read_file(folder / "stderr.txt").find("warning"), std::string::npos) << read_file(folder / "stderr.txt");
+  ASSERT_EQ(run(folder, "check scene.toml --set 'seam=[]'"), 0);
+  EXPECT_EQ(read_file(folder / "stderr.txt").find("warning"), std::string::npos) << read_file(folder / "stderr.txt");
+  // A panel drawn clockwise is turned round, which is worth a note only.
+  std::string clockwise = squares("");
+  clockwise.replace(clockwise.find("[[0, 0], [40, 0], [40, 40], [0, 40]]"), 36, "[[0, 0], [0, 40], [40, 40], [40, 0]]");
+  write_file(folder / "c.json", clockwise);
+  ASSERT_EQ(run(folder, "inspect c.json --json"), 0);
+  const auto json = nlohmann::json::parse(read_file(folder / "stdout.txt"));
+  EXPECT_TRUE(json["warnings"].empty()) << json["warnings"].dump();
+  EXPECT_EQ(json["notes"].size(), 1u);
+}
+
+TEST(PatternScene, PanelsOfADrawingHangUprightByTheirGrain) {
+  const Folder folder("upright");
+  // As pattern systems draw: the grain along x, two pieces one on the other.
+  const auto piece = [](const std::string& name, const char* width) {
+    const auto at = [](const std::string& x, const std::string& y) { return " 10\n" + x + "\n 20\n" + y + "\n"; };
+    std::string out =
+        "  0\nBLOCK\n  8\n0\n  2\n" + name + "\n" + at("0", "0") + "  0\nLWPOLYLINE\n  8\n1\n 90\n4\n 70\n1\n";
+    for (const auto& p : {at("0", "0"), at("600", "0"), at("600", width), at("0", width)}) out += p;
+    return out + "  0\nLINE\n  8\n7\n" + at("100", "50") + " 11\n500\n 21\n50\n  0\nENDBLK\n  8\n0\n";
+  };
+  write_file(
+      folder / "p.dxf",
+      "  0\nSECTION\n  2\nBLOCKS\n" + piece("A", "300") + piece("B", "200") +
+          "  0\nENDSEC\n  0\nSECTION\n  2\nENTITIES\n  0\nTEXT\n  8\n1\n 10\n0\n 20\n0\n 40\n5\n  1\nUnits: METRIC\n"
+          "  0\nENDSEC\n  0\nEOF\n");
+  if (run(folder, "init --pattern p.dxf -o scene.toml") == 3) GTEST_SKIP() << "built without dxflib";
+  const Build built = build(read_scene(folder / "scene.toml"));
+  double left = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Eigen::Matrix3Xd net = built.net(static_cast<int>(k), built.start);
+    const double width = k == 0 ? 0.3 : 0.2;
+    expect_near_rel(net.row(1).maxCoeff(), 0, 0, 1e-9);
+    expect_near_rel(net.row(1).minCoeff(), -0.6, 1e-9);
+    expect_near_rel(net.row(0).minCoeff(), left, 1e-9, 1e-9);
+    expect_near_rel(net.row(0).maxCoeff(), left + width, 1e-9);
+    left += width + 0.05;
+  }
+  EXPECT_EQ(built.scene.pins.size(), 2u) << "each by its upper edge";
+}
+
+TEST(BodyFit, ABoxHoldsWhatLiesInIt) {
+  const Folder folder("box");
+  write_box(folder / "body.obj");
+  const TriangleMesh box = read_mesh(folder / "body.obj");
+  EXPECT_EQ(count_inside(
+                box, {{0, 0, 0}, {0.149, 0.6, 0.099}, {0.151, 0, 0}, {0, 0.7, 0}, {0, 0, -0.101}, {0.1, -0.9, 0.05}}),
+            3);
+  expect_near_rel(trunk_section(box, 0.1).girth, 1, 1e-7);  // meshes are read in single precision
+  EXPECT_EQ(trunk_section(box, 2).girth, 0);
+  expect_near_rel(turns_around({{1, 0}, {0, 1}, {-1, 0}, {0, -1}}, {0.2, 0.1}), 1, 1e-12);
+  expect_near_rel(turns_around({{1, 0}, {0, 1}, {-1, 0}, {0, -1}}, {2, 0}), 0, 0, 1e-12);
+}
+
+TEST(PatternScene, SaysHowMuchLiesInTheBody) {
+  const Folder folder("inside");
+  write_box(folder / "body.obj");
+  // The front half way into the box: its plane at z = 0, from x = -0.4 to 0.4 at the hem; the back stays behind it.
+  write_file(folder / "skirt.jsonc",
+             replaced(skirt_text(), "\"translation\": [0, 0, 60]", "\"translation\": [0, 0, 0]"));
+  const PatternScene scene = pattern_scene(folder / "skirt.jsonc", folder / "body.obj", folder / "scene.toml");
+  EXPECT_NE(scene.text.find("% of the panels lies inside the body, of 'front' "), std::string::npos) << scene.text;
+  write_file(folder / "skirt.jsonc", skirt_text());
+  EXPECT_NE(pattern_scene(folder / "skirt.jsonc", folder / "body.obj", folder / "scene.toml")
+                .text.find("# 0.0 % of the panels lies inside the body."),
+            std::string::npos);
 }
 
 TEST(PatternScene, TheSceneIsCompleteAndValid) {
@@ -91,7 +222,9 @@ TEST(PatternScene, TheSceneIsCompleteAndValid) {
   for (const ScenePin& pin : scene.pins) EXPECT_EQ(pin.at.text, "curve:0,0");
   // The box is 2 (0.3 + 0.2) m around.
   EXPECT_NE(written.text.find("the body measures 1.000 m there"), std::string::npos) << written.text;
-  EXPECT_NO_THROW(build(scene));
+  const Build built = build(scene);
+  EXPECT_EQ(built.panels.size(), scene.panels.size());
+  EXPECT_GT(built.model->lumped_mass().sum(), 0);
 }
 
 TEST(PatternScene, DrapeSaysWhatItLeavesOut) {
@@ -102,8 +235,11 @@ TEST(PatternScene, DrapeSaysWhatItLeavesOut) {
       << read_file(folder / "stderr.txt");
   EXPECT_EQ(run(folder, "init --pattern skirt.jsonc -o scene.toml"), 8) << "it overwrites nothing";
   const std::string coarse = " --set 'panel.0.refine={spans=[3,3]}' --set 'panel.1.refine={spans=[3,3]}'";
-  EXPECT_EQ(run(folder, "check scene.toml" + coarse), 0) << read_file(folder / "stderr.txt");
+  EXPECT_EQ(run(folder, "check scene.toml" + coarse), 3) << "what drape refuses isn't valid";
   EXPECT_NE(read_file(folder / "stderr.txt").find("seams are not simulated"), std::string::npos);
+  EXPECT_EQ(read_file(folder / "stdout.txt").find("valid"), std::string::npos);
+  EXPECT_EQ(run(folder, "check scene.toml --set 'seam=[]' --set 'obstacle=[]'" + coarse), 0)
+      << read_file(folder / "stderr.txt");
   EXPECT_EQ(run(folder, "drape scene.toml -o out" + coarse), 3);
   const std::string refusal = read_file(folder / "stderr.txt");
   EXPECT_NE(refusal.find("error: scene.toml:"), std::string::npos) << refusal;

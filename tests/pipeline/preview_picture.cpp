@@ -7,6 +7,10 @@
 #include <vector>
 
 #include "geometry/error.h"
+#include "pipeline/colour.h"
+#include "pipeline/colour_scale.h"
+#include "pipeline/font.h"
+#include "pipeline/image.h"
 #include "pipeline/preview.h"
 #include "pipeline/stroke_font.h"
 #include "support/draped.h"
@@ -156,6 +160,70 @@ TEST_F(Preview, RefusesAFrameWithNothingToDraw) {
   EXPECT_THROW(preview_png(draped.frame()), OutputError);
 }
 
+TEST(ColourScale, ZeroIsOnItAndSignsCountByOneMeasure) {
+  const auto values = [](double low, double high) {
+    std::vector<float> out;
+    for (int k = 0; k <= 1000; ++k) out.push_back(static_cast<float>(low + (high - low) * k / 1000));
+    return out;
+  };
+  const ColourScale positive = scale_of(values(0.004, 0.02)), both = scale_of(values(-0.01, 0.02)),
+                    negative = scale_of(values(-0.03, -0.01)), nearly = scale_of(values(-0.0001, 0.02));
+  EXPECT_FALSE(positive.both_signs);
+  EXPECT_EQ(positive.low, 0);
+  EXPECT_EQ(positive.colour(0.0), strain_colour(0));
+  EXPECT_FALSE(nearly.both_signs);
+  EXPECT_TRUE(both.both_signs);
+  EXPECT_TRUE(negative.both_signs);
+  EXPECT_EQ(negative.high, 0);
+  for (const ColourScale& scale : {both, negative}) {
+    EXPECT_EQ(scale.colour(0), signed_colour(0));
+    EXPECT_LE(scale.low, 0);
+    EXPECT_GE(scale.high, 0);
+  }
+  // Half a percent at each end is clipped, and known.
+  EXPECT_NEAR(both.high, 0.02 - 0.005 * 0.03, 1e-5);
+  EXPECT_EQ(both.most, 0.02f);
+  EXPECT_EQ(both.least, -0.01f);
+  // Equal amounts of both signs are equally light; zero is the lightest and hardly coloured.
+  const auto light = [&](double x) { return signed_colour(x).dot(Eigen::Vector3f(0.2126f, 0.7152f, 0.0722f)); };
+  for (const double x : {0.2, 0.5, 1.0}) {
+    EXPECT_NEAR(light(x), light(-x), 0.06 * light(x) + 0.02) << x;
+    EXPECT_LT(light(x), light(0.8 * x));
+    EXPECT_GT(signed_colour(x)[0], signed_colour(x)[2]);
+    EXPECT_LT(signed_colour(-x)[0], signed_colour(-x)[2]);
+  }
+  EXPECT_LT(signed_colour(0).maxCoeff() - signed_colour(0).minCoeff(), 0.02);
+}
+
+TEST(ColourScale, TicksAreRoundAndHaveZeroAmongThem) {
+  EXPECT_EQ(round_ticks(-0.011, 0.024, 6), (std::vector<double>{-0.01, 0, 0.01, 0.02}));
+  for (const auto& [low, high] : {std::pair{-3.7e-5, 1.1e-4}, {0.0, 0.0199}, {-0.3, 0.0}, {0.0, 7.0}, {-1e-7, 1e-7}}) {
+    const std::vector<double> ticks = round_ticks(low, high, 6);
+    EXPECT_GE(ticks.size(), 3u);
+    EXPECT_LE(ticks.size(), 7u);
+    EXPECT_NE(std::ranges::find(ticks, 0.0), ticks.end());
+    for (const double tick : ticks) {
+      EXPECT_GE(tick, low - 1e-9 * (high - low));
+      EXPECT_LE(tick, high + 1e-9 * (high - low));
+    }
+    const double step = ticks[1] - ticks[0], leading = step / std::pow(10.0, std::floor(std::log10(step) + 1e-9));
+    EXPECT_TRUE(std::abs(leading - 1) < 1e-6 || std::abs(leading - 2) < 1e-6 || std::abs(leading - 5) < 1e-6) << step;
+  }
+}
+
+TEST_F(Preview, OfAFieldOfBothSignsShowsBothColoursAndAPaleZero) {
+  const test::Draped draped(false, -0.02, 0.02);
+  // strain_weft rises from the top to the hem, strain_warp is its least: the larger of both is weft.
+  const Picture picture(preview_png(draped.frame()));
+  int blue = 0, orange = 0;
+  for (const auto& pixel : picture.rgb) {
+    if (saturation(pixel) < 0.3) continue;
+    (pixel[2] > pixel[0] ? blue : orange) += 1;
+  }
+  EXPECT_GT(blue, 10000);
+  EXPECT_GT(orange, 10000);
+}
+
 TEST(StrokeFont, CapitalsStandFromTheBaselineToTheHeightOfADigit) {
   for (char c = 'A'; c <= 'Z'; ++c) {
     float low = -100, high = 100;
@@ -166,9 +234,49 @@ TEST(StrokeFont, CapitalsStandFromTheBaselineToTheHeightOfADigit) {
   }
 }
 
-TEST(StrokeFont, ACharacterOfSeveralBytesIsOneGap) {
-  EXPECT_TRUE(text_strokes("é", 10).lines.empty());
-  EXPECT_EQ(text_strokes("é", 10).width, text_strokes(" ", 10).width);
+TEST(StrokeFont, AnUnknownCharacterIsOneBox) {
+  for (const char* text : {"\xc3\xa9", "\xe5\x90\x8e", "\xf0\x9f\x91\x95", "\xff"}) {
+    const TextStrokes shape = text_strokes(text, 12);
+    ASSERT_EQ(shape.lines.size(), 1u);
+    EXPECT_EQ(shape.lines[0].front(), shape.lines[0].back());
+    EXPECT_EQ(shape.width, 8);
+    EXPECT_FALSE(has_strokes(text));
+  }
+  EXPECT_TRUE(has_strokes("front draped, 3.5 %"));
+}
+
+TEST(Text, LettersBeyondTheStrokeFontShowAsOutlinesOrBoxes) {
+  // Whatever fonts this machine has, no letter vanishes: with each the line has more ink, and more width.
+  float width = 0;
+  std::size_t parts = 0;
+  for (const char* text : {"R", "R\xc3\xbc",
+                           "R\xc3\xbc"
+                           "ckenteil",
+                           "R\xc3\xbc"
+                           "ckenteil \xe5\x90\x8e",
+                           "R\xc3\xbc"
+                           "ckenteil \xe5\x90\x8e\xe7\x89\x87"}) {
+    const TextShape shape = text_shape(text, 20);
+    EXPECT_GT(shape.width, width) << text;
+    EXPECT_GT(shape.strokes.size() + shape.outlines.size(), parts) << text;
+    width = shape.width, parts = shape.strokes.size() + shape.outlines.size();
+    for (const auto& outline : shape.outlines)
+      for (const Eigen::Vector2f& p : outline) EXPECT_TRUE(p.x() >= -10 && p.x() <= shape.width + 10 && p.y() > -40);
+  }
+  Image with(300, 40), without(300, 40);
+  draw_text(with, 5, 30, 20, "\xc3\xbc", {1, 1, 1});
+  EXPECT_NE(png(with), png(without));
+}
+
+// Outlines stand on the baseline and are as high as a digit of the stroke font, so that labels mix.
+TEST(Text, OutlinesHaveTheHeightOfADigit) {
+  const auto outlines = text_outlines("H", 30);
+  if (!outlines) GTEST_SKIP() << "no fonts on this machine";
+  float low = -100, high = 100;
+  for (const auto& polygon : outlines->polygons)
+    for (const Eigen::Vector2f& p : polygon) low = std::max(low, p.y()), high = std::min(high, p.y());
+  EXPECT_NEAR(high, -30, 0.1);
+  EXPECT_NEAR(low, 0, 0.1);
 }
 
 }  // namespace

@@ -15,7 +15,10 @@
 #include <vector>
 
 #include "geometry/error.h"
+#include "io/file.h"
+#include "io/vtu.h"
 #include "pipeline/panels.h"
+#include "support/draped.h"
 #include "support/near.h"
 
 namespace toile {
@@ -42,7 +45,8 @@ while [ $# -gt 0 ]; do
 done
 here=$(dirname "$0")
 echo "$dt $mode" >> "$here/calls"
-injected=0 gravity=-1 exit=0 strain=0.001 seed=0
+injected=0 gravity=-1 exit=0 strain=0.001 seed=0 limit=0.01 least=-0.001 most=0.001
+band='{"compress": [0.05, 0.05], "stretch": [0.02, 0.03], "tolerance": 2e-4}'
 case $mode in
   refuse) echo "note: about to fail" >&2; echo "error: scene.toml:3: nonsense" >&2; exit 3 ;;
   silent) exit 4 ;;
@@ -53,6 +57,10 @@ case $mode in
   nothing) exit 0 ;;
   gains) injected=0.02 ;;
   overstrained) strain=0.02 ;;
+  band) limit=$band ;;
+  stretched) limit=$band; most=0.0303 ;;
+  squeezed) limit=$band; least=-0.0505 ;;
+  unsaid) limit=$band; least='"?"' ;;
   null) strain=null ;;
   limit) echo "error: the limit is not met" >&2; exit=6 ;;
   random) seed=$(wc -l < "$here/calls") ;;
@@ -65,7 +73,8 @@ cat > "$dir/report.json" <<END
 {"model": "shell", "scheme": "verlet", "degrees_of_freedom": 12, "steps": 1, "simulated_seconds": $dt,
  "panels": [{"degree": [2, 3], "spans": [$size], "cells": {"cut": 1}}],
  "wall_seconds": 0.25, "seconds": {"force": 0.2, "write": 0.1},
- "strain": {"at_constraints_max": $strain, "limit": 0.01}, "energy": {"injected": $injected, "gravity": $gravity},
+ "strain": {"at_constraints_max": $strain, "limit": $limit,
+            "at_constraints": {"min_weft": -0.0499, "max_weft": 0.0199, "min_warp": $least, "max_warp": $most}}, "energy": {"injected": $injected, "gravity": $gravity},
  "points": [{"position": [1, 2, $value]}], "memory": $(ulimit -v),
  "measures": {"depth": {"value": $value, "unit": "m"}, "mass": {"value": 1, "unit": "kg"}}}
 END
@@ -150,9 +159,10 @@ TEST(Study, FindsTheOrderOfItsRuns) {
   EXPECT_EQ(series["reference"]["uncertainty"], 1e-6);
   EXPECT_NE(lab.table.find("dt: order 2.00 in dt, last pair 2.00 (3 points)"), std::string::npos) << lab.table;
   EXPECT_NE(lab.table.find("by hand, uncertainty 1e-06"), std::string::npos) << lab.table;
-  for (const char* plot : {"error_over_time.svg", "error_over_dofs.svg", "error_over_dt.svg", "time_by_phase.svg"}) {
+  for (const char* plot : {"error_over_time.svg", "error_over_dt.svg", "time_by_phase.svg"}) {
     EXPECT_TRUE(std::filesystem::exists(lab / "out" / plot)) << plot;
   }
+  EXPECT_FALSE(std::filesystem::exists(lab / "out/error_over_dofs.svg")) << "all runs have the same mesh";
   EXPECT_NE(read_file(lab / "out/error_over_dt.svg").find("order 2.00 in dt"), std::string::npos);
 }
 
@@ -208,6 +218,11 @@ TEST(Study, VectorsCompareByDistance) {
                     "uncertainty = 0, source = \"s\" }\n"),
             0);
   EXPECT_NEAR(lab.result()["series"][0]["cases"][0]["error"], 5, 1e-12);
+  // A number a cell.
+  const auto rows = csv(read_file(lab / "out/study.csv"));
+  EXPECT_EQ(column(rows, "reference.0"), std::vector<std::string>{"1"});
+  EXPECT_EQ(column(rows, "reference.2"), std::vector<std::string>{"7.25"});
+  EXPECT_FALSE(column(rows, "value.2")[0].empty());
 }
 
 TEST(Study, FailedRunsAreRowsWithTheirCause) {
@@ -276,7 +291,9 @@ TEST(Study, EveryRowHasTheColumnsOfTheContract) {
             (std::vector<std::string>{"shell", "verlet", "cut", "2x3", "4x5", "12", "0.5", "depth", "3.25", "3", "0.25",
                                       "0.25", "ok"}));
   EXPECT_EQ(column(rows, "strain.limit")[0], "0.01");
-  EXPECT_EQ(column(rows, "panel.0.refine.spans")[0], "[4, 5]");
+  EXPECT_EQ(column(rows, "panel.0.refine.spans.0")[0], "4");
+  EXPECT_EQ(column(rows, "panel.0.refine.spans.1")[0], "5");
+  EXPECT_EQ(column(rows, "spans_v")[0], "5");
   EXPECT_EQ(column(rows, "repeat"), (std::vector<std::string>{"1", "2", "1", "2"}));
 }
 
@@ -318,7 +335,7 @@ TEST(Study, TheSameStudyWritesTheSameBytes) {
   const std::string text = depth + three + "vary.solver.dt = [0.4, 0.2]\nvary.panel.0.name = [\"fine\", \"refuse\"]\n";
   ASSERT_EQ(lab.run(text, "a"), 0);
   ASSERT_EQ(lab.run(text, "b"), 0);
-  EXPECT_EQ(read_file(lab / "a/error_over_dofs.svg"), read_file(lab / "b/error_over_dofs.svg"));
+  EXPECT_EQ(read_file(lab / "a/error_over_dt.svg"), read_file(lab / "b/error_over_dt.svg"));
   EXPECT_EQ(read_file(lab / "a/time_by_phase.svg"), read_file(lab / "b/time_by_phase.svg"));
   json a = lab.result("a"), b = lab.result("b");
   for (json* result : {&a, &b}) {
@@ -361,22 +378,58 @@ TEST(Study, StabilityIsAVerdictOnEachRun) {
   EXPECT_EQ(lab.run(wrong + "0.005\n"), 6);
 }
 
-TEST(Study, NumbersThatAreNotFiniteAreFoundInBinaryFrames) {
-  Folder folder("study_vtu");
-  const auto frame = [&](double value) {
-    std::string bytes(16, '\0');
-    const std::uint64_t length = 8;
-    std::memcpy(bytes.data(), &length, 8);
-    std::memcpy(bytes.data() + 8, &value, 8);
-    write_file(folder / "run/frames/a.vtu",
-               "<VTKFile header_type=\"UInt64\"><DataArray type=\"Float64\" Name=\"strain\" format=\"appended\" "
-               "offset=\"0\"/><AppendedData encoding=\"raw\">_" +
-                   bytes + "</AppendedData></VTKFile>");
+// Frames as the run's own sink writes them, one number replaced.
+TEST(Study, NumbersThatAreNotFiniteAreFoundInFrames) {
+  const auto judged = [](const auto& change) {
+    Folder folder("study_vtu");
+    test::Draped draped(true);
+    change(draped);
+    VtuSink(folder / "run/frames", "cloth").write(draped.frame());
     return not_finite_in(folder / "run");
   };
-  EXPECT_EQ(frame(1), "");
-  EXPECT_EQ(frame(std::nan("")), "frames/a.vtu: strain");
-  EXPECT_EQ(frame(-INFINITY), "frames/a.vtu: strain");
+  const auto replace = [](auto member, double value) {
+    return [=](test::Draped& draped) { (draped.panel.fields.*member).back()[0] = value; };
+  };
+  EXPECT_EQ(judged([](test::Draped&) {}), "");
+  EXPECT_EQ(judged(replace(&FrameFields::strain, std::nan(""))), "frames/cloth_0000/triangles.vtu: strain");
+  EXPECT_EQ(judged(replace(&FrameFields::nominal, -INFINITY)), "frames/cloth_0000/triangles.vtu: nominal_stress_weft");
+  EXPECT_EQ(judged([](test::Draped& d) { d.panel.fields.curvature.back()[2] = INFINITY; }),
+            "frames/cloth_0000/triangles.vtu: curvature_twist");
+  EXPECT_EQ(judged([](test::Draped& d) { d.panel.point_stress.back()[3] = std::nan(""); }),
+            "frames/cloth_0000/points.vtu: raw_nominal_stress_warp");
+}
+
+TEST(Study, AFrameThatCantBeReadIsNotFinite) {
+  Folder folder("study_vtu_cut");
+  const test::Draped draped;
+  VtuSink(folder / "frames", "cloth").write(draped.frame());
+  const auto file = folder / "frames/cloth_0000/net.vtu";
+  const std::string whole = read_file(file);
+  write_file(file, whole.substr(0, whole.size() / 2));
+  EXPECT_NE(not_finite_in(folder.path()).find("net.vtu: array "), std::string::npos) << not_finite_in(folder.path());
+  write_file(file, "<VTKFile><DataArray format=\"ascii\">1 2</DataArray></VTKFile>");
+  EXPECT_NE(not_finite_in(folder.path()).find("net.vtu: no VTU file"), std::string::npos);
+}
+
+TEST(Study, WhatARunHasntGotMayBeNull) {
+  Folder folder("study_null");
+  write_file(folder / "report.json", R"({"contact": {"max_penetration": null}, "seams": null, "mass": 1})");
+  EXPECT_EQ(not_finite_in(folder.path()), "");
+  write_file(folder / "report.json", R"({"contact": {"max_penetration": null}, "measures": {"seams": null}})");
+  EXPECT_EQ(not_finite_in(folder.path()), "report.json: null at measures.seams");
+}
+
+TEST(Study, ABandIsJudgedByDirectionAndSign) {
+  Lab lab("band");
+  const std::string head = "kind = \"stability\"\nset.panel.0.name = ";
+  const auto cause = [&](const std::string& mode) {
+    lab.run(head + "\"" + mode + "\"\n");
+    return column(csv(read_file(lab / "out/study.csv")), "cause")[0];
+  };
+  EXPECT_EQ(cause("band"), "");
+  EXPECT_EQ(cause("stretched"), "the warp is stretched by 0.0303, its limit is 0.03");
+  EXPECT_EQ(cause("squeezed"), "the warp is compressed by 0.0505, its limit is 0.05");
+  EXPECT_EQ(cause("unsaid"), "the warp is compressed by nan, its limit is 0.05");
 }
 
 TEST(Study, WrongFilesAreRefusedWithLineAndNearestKey) {

@@ -104,34 +104,10 @@ TEST(LoopValidation, ACuspIsNoCrossing) {
   expect_laws(face, trace_trims(face));
 }
 
-TEST(LoopValidation, RefusesRetracedLoops) {
-  expect_error(with_outline(polygon_loop({{1, 1}, {3, 1}, {3, 2}, {2, 2}, {3, 2}, {3, 3}, {1, 3}})), {"runs along"});
-}
-
 TEST(LoopValidation, RefusesHolesOutside) {
   TrimmedSurface face = trimmed(
       unit_cells(4), {polygon_loop({{1, 1}, {2, 1}, {2, 2}, {1, 2}}), backwards(loop_of({round_curve({3, 3}, 0.5)}))});
   expect_error(face, {"panel 'panel', loop 1", "outside the outer loop"});
-}
-
-TEST(LoopValidation, RefusesHolesThatCrossTheOutline) {
-  TrimmedSurface face =
-      trimmed(unit_cells(4), {polygon_loop(square), backwards(loop_of({round_curve({3.5, 2}, 0.5)}))});
-  expect_error(face, {"panel 'panel', loop", "crosses", "(u, v) = (3.5, "});
-}
-
-// The sides of the hole cross the outline where one of its segments ends.
-TEST(LoopValidation, RefusesCrossingsInJointsOfSegments) {
-  for (const bool weighted : {false, true}) {
-    std::vector<Curve2> outline;
-    const std::vector<Vector2d> corners = {{1, 1}, {3, 1}, {3, 2}, {3, 3}, {1, 3}};
-    for (std::size_t k = 0; k < corners.size(); ++k)
-      outline.push_back(bezier_curve({corners[k], corners[(k + 1) % corners.size()]},
-                                     weighted ? std::vector<double>{1, 8} : std::vector<double>{}));
-    expect_error(
-        trimmed(unit_cells(4), {loop_of(outline), backwards(polygon_loop({{2, 2}, {3.5, 2}, {3.5, 2.5}, {2, 2.5}}))}),
-        {"crosses", "(u, v) = (3, 2"});
-  }
 }
 
 TEST(LoopValidation, RefusesHolesInHoles) {

@@ -462,7 +462,7 @@ ExactLoop square_around(const Vector2d& c, double h) {
   return loop;
 }
 
-// Loops that cross, holes outside and holes in holes.
+// Holes that cross the outline or another hole; and, to be refused, holes outside and holes in holes.
 TrimCase invalid(Random& random) {
   TrimCase out{"invalid", {}, {}, {}};
   out.valid = false;
@@ -472,6 +472,7 @@ TrimCase invalid(Random& random) {
       const ExactLoop hole = star_in_box(random, 1, 1, 2);
       const ExactPiece& p = hole[static_cast<std::size_t>(random.below(static_cast<int>(hole.size())))];
       const Vector2d c = point_at(p, random.chance(50) ? 0 : 0.4375);
+      out.family = "crossing";
       out.loops = {border(random, 4), reversed(hole), reversed(square_around(c, 0.0625))};
       break;
     }
@@ -479,6 +480,7 @@ TrimCase invalid(Random& random) {
       const ExactLoop outline = star_in_box(random, 0.5, 0.5, 3);
       const ExactPiece& p = outline[static_cast<std::size_t>(random.below(static_cast<int>(outline.size())))];
       const Vector2d c = point_at(p, random.chance(50) ? 0 : 0.5625);
+      out.family = "crossing";
       out.loops = {outline, reversed(square_around(c, 0.0625))};
       break;
     }
@@ -840,6 +842,43 @@ std::string wrong_point(Random& random, const TrimCase& given, TrimmedSurface su
   return "";
 }
 
+// Holes that cross: a place is material where the outer loop holds it and no hole does, whatever loops come out.
+// Places within 1e-6 of a loop may be on either side of where it was cut.
+std::string wrong_material(Random& random, TrimmedSurface surface) {
+  const std::vector<ExactLoop> given = traced_loops(surface);
+  const auto material = [&](double u, double v) -> std::optional<bool> {
+    bool in = true;
+    for (std::size_t l = 0; l < given.size(); ++l) {
+      const std::optional<int> n = exact_winding({given[l]}, u, v);
+      if (!n) return std::nullopt;
+      in = in && (*n != 0) == (l == 0);
+    }
+    return in;
+  };
+  try {
+    validate_loops(surface);
+    const TrimTopology traced = trace_trims(surface);
+    const Interval u = surface.surface.u().domain(), v = surface.surface.v().domain();
+    const double du = 1e-6 * u.length(), dv = 1e-6 * v.length();
+    for (int k = 0; k < 40; ++k) {
+      const ExactLoop& loop = given[static_cast<std::size_t>(random.below(static_cast<int>(given.size())))];
+      Vector2d x = point_at(loop[static_cast<std::size_t>(random.below(static_cast<int>(loop.size())))], random.unit());
+      const double away = std::ldexp(1.0, -random.between(2, 14));
+      x += away * Vector2d((random.unit() - 0.5) * u.length(), (random.unit() - 0.5) * v.length());
+      if (!u.contains(x.x()) || !v.contains(x.y())) continue;
+      const std::optional<bool> in = material(x.x(), x.y());
+      bool clear = in.has_value();
+      for (const double a : {-du, du})
+        for (const double b : {-dv, dv}) clear = clear && material(x.x() + a, x.y() + b) == in;
+      if (clear && contains(surface, traced, x) != *in)
+        return "point (" + std::to_string(x.x()) + ", " + std::to_string(x.y()) + ") is " + (*in ? "material" : "none");
+    }
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
 }  // namespace
 
 TrimCase random_trim_case(std::uint64_t seed) {
@@ -891,6 +930,7 @@ std::string wrong_decision(const TrimCase& given, std::uint64_t seed) {
   const int nu = static_cast<int>(given.u.size()) - 1, nv = static_cast<int>(given.v.size()) - 1;
   const ExactTopology exact = given.valid ? exact_topology(given.u, given.v, given.loops) : ExactTopology{};
   const auto wrong = [&](const TrimmedSurface& surface, const ExactTopology& expected) {
+    if (given.family == "crossing") return wrong_material(random, surface);
     if (!given.valid) return refused(surface) ? std::string() : std::string("accepted");
     return traced_difference(surface, expected);
   };

@@ -1,12 +1,12 @@
-// How often this program has asked for memory. Linked into programs, never into the library.
+// How often a test program has asked for memory. Takes the place of malloc, so it is linked into tests alone.
 #pragma once
 
 #include <optional>
 
-namespace toile {
+namespace toile::test {
 
 // Calls of malloc and its like by this thread so far, those of operator new and of Eigen among them; empty where the C
 // library doesn't let a program count them.
 std::optional<long> allocation_count();
 
-}  // namespace toile
+}  // namespace toile::test

@@ -1,4 +1,4 @@
-#include "pipeline/drawing_plane.h"
+#include "io/pattern_sheet.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -21,6 +21,25 @@ std::optional<DrawingPlane> drawing_plane(const NurbsSurface& surface) {
   Vector3d right = std::abs(normal.z()) > 0.9999 ? Vector3d(normal.z() > 0 ? 1 : -1, 0, 0) : Vector3d(jet.u);
   right = (right - right.dot(normal) * normal).normalized();
   return DrawingPlane{right, normal.cross(right)};
+}
+
+PatternSheet::PatternSheet(const NurbsSurface& surface) : surface_(&surface), plane_(drawing_plane(surface)) {
+  if (plane_) return;
+  const Interval u = surface.u().domain(), v = surface.v().domain();
+  constexpr int samples = 8;
+  stretch_.setZero();
+  for (int j = 0; j < samples; ++j) {
+    for (int i = 0; i < samples; ++i) {
+      const SurfaceJet jet =
+          evaluate(surface, u.min + u.length() * (i + 0.5) / samples, v.min + v.length() * (j + 0.5) / samples);
+      stretch_ += Eigen::Vector2d(jet.u.norm(), jet.v.norm()) / (samples * samples);
+    }
+  }
+}
+
+Eigen::Vector2d PatternSheet::operator()(const Eigen::Vector2d& uv) const {
+  if (plane_) return (*plane_)((*surface_)(uv.x(), uv.y()));
+  return stretch_.cwiseProduct(uv);
 }
 
 }  // namespace toile

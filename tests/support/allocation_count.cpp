@@ -1,4 +1,4 @@
-#include "pipeline/allocation_count.h"
+#include "support/allocation_count.h"
 
 #include <cstddef>
 #include <cstdlib>
@@ -41,18 +41,18 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) {
 }
 }
 
-namespace toile {
+namespace toile::test {
 std::optional<long> allocation_count() {
   return count;
 }
-}  // namespace toile
+}  // namespace toile::test
 
 #else
 
-namespace toile {
+namespace toile::test {
 std::optional<long> allocation_count() {
   return std::nullopt;
 }
-}  // namespace toile
+}  // namespace toile::test
 
 #endif

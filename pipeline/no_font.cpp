@@ -1,0 +1,9 @@
+#include "pipeline/font.h"
+
+namespace toile {
+
+std::optional<TextOutlines> text_outlines(std::string_view, float) {
+  return std::nullopt;
+}
+
+}  // namespace toile

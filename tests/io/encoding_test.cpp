@@ -1,0 +1,36 @@
+// Text of old files becomes UTF-8; what is UTF-8 stays.
+#include "io/encoding.h"
+
+#include <gtest/gtest.h>
+
+namespace toile {
+namespace {
+
+TEST(Encoding, Utf8StaysWhateverTheCodePage) {
+  for (const char* text : {"", "plain", "\u00c4rmel", "\u540e\u7247", "\U0001f9f5"}) {
+    EXPECT_TRUE(valid_utf8(text));
+    EXPECT_EQ(to_utf8(text, "CP1251"), text);
+  }
+}
+
+TEST(Encoding, WhatIsNoUtf8IsReadInItsCodePage) {
+  EXPECT_EQ(to_utf8("\xc4rmel"), "\u00c4rmel");
+  EXPECT_EQ(to_utf8("\xd0\xf3\xea\xe0\xe2", "CP1251"), "\u0420\u0443\u043a\u0430\u0432");
+  EXPECT_EQ(to_utf8("\xc4rmel", "no such page"), "\u00c4rmel");
+  // Overlong forms, surrogates and numbers beyond the last are no UTF-8.
+  for (const char* text : {"\xc0\x80", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xff", "\xc4"}) {
+    EXPECT_FALSE(valid_utf8(text));
+    EXPECT_TRUE(valid_utf8(to_utf8(text, "CP1252")));
+  }
+}
+
+TEST(Encoding, CodePagesOfDxfHaveNames) {
+  EXPECT_EQ(codepage_of_dxf("ANSI_1252"), "CP1252");
+  EXPECT_EQ(codepage_of_dxf("dos850"), "CP850");
+  EXPECT_EQ(codepage_of_dxf("iso8859-1"), "ISO-8859-1");
+  EXPECT_EQ(codepage_of_dxf("ascii"), "");
+  EXPECT_EQ(codepage_of_dxf("ANSI_"), "");
+}
+
+}  // namespace
+}  // namespace toile
