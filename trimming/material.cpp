@@ -392,7 +392,8 @@ class Resolver {
         const TrimCurve c = curve_of(runs[i]);
         mark.at = c.reversed ? c.curve.end() : c.curve.start();
         mark.curve = c.reversed ? reversed(c.curve) : c.curve;
-        mark.text = on_border(ends[i][0]) && on_border(ends[i][1]) ? "bridge" : "slit";
+        mark.kind = MarkKind::slit;
+        if (on_border(ends[i][0]) && on_border(ends[i][1])) mark.text = "bridge";
         slits.push_back({std::move(mark), middles[i], l});
       }
     }
@@ -476,8 +477,8 @@ void add_slits(std::vector<Resolver::Slit>& slits, const std::vector<TrimLoop>& 
     std::string what = "an edge run out and back bounds nothing; it is left out";
     for (std::size_t p = 0; p < out.panels.size(); ++p) {
       if (!holds(out.panels[p], spans[p], slit.middle, counts)) continue;
-      what = slit.mark.text == "slit" ? "an edge run out and back is kept as a mark, a slit"
-                                      : "an edge run twice joins two loops; they are parted, and it is kept as a mark";
+      what = slit.mark.text.empty() ? "an edge run out and back is kept as a mark, a slit"
+                                    : "an edge run twice joins two loops; they are parted, and it is kept as a mark";
       out.panels[p].marks.push_back(std::move(slit.mark));
       break;
     }

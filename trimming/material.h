@@ -17,9 +17,8 @@ struct MaterialOptions {
 };
 
 //   (1) The panels' loops are simple; of one panel, the first holds the others, and those lie apart but for touches.
-//   (2) A piece that one loop runs along in both directions bounds nothing: it is a mark, kind `slit`, of the panel
-//   that
-//       it lies in; "bridge" where it joins the outer loop with a hole.
+//   (2) A piece that one loop runs along in both directions bounds nothing: it is a mark, of kind `slit`, of the panel
+//       that it lies in; "bridge" by its text where it joins the outer loop with a hole.
 //   (3) Curves are pieces of the given ones over the same parameters, with their numbers; where a loop is made of
 //       several, the numbers of the later ones follow on those of the first.
 //   (4) Loops that need no cut come out as they came in; `source` is their position, -1 for loops that were made.
