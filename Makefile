@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Everything a newcomer needs; each target installs what it lacks.
 #   make demo     build, drape a real panel file, say where the results are
 #   make test     build with warnings as errors, run all tests

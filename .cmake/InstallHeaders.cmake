@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Installs HEADERS of SOURCE, and every header of the project that they include, under PREFIX/INCLUDE_DIR/toile; each
 # include of one becomes "toile/<room>/<header>". WORK is a folder for the changed copies.
 cmake_policy(PUSH)

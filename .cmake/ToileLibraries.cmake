@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # Libraries that bring no CMake package of their own. Our build reads this file, and so does find_package(Toile).
 #   toile_find_library(<name>): the imported target toile::<name>.
 function(toile_find_library name)

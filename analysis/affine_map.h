@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The one affine map between what a scheme solves for and what a model sees: q = T x + g(t).
 #pragma once
 

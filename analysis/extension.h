@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Extended B-splines: functions with too little cloth under them, and control points with none, follow their neighbours
 // by polynomial extension, so that small cut cells bound neither the time step nor the conditioning.
 // [Hoellig, Reif, Wipper 2001; positions are extended, not displacements]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Several numbers at once, one for each of several cells: as many as the machine's registers hold. The same kernels run
 // on plain doubles.
 #pragma once

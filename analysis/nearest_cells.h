@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The nearest of some cells for every point of a grid.
 #pragma once
 

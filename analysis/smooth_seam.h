@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Seams of closed surfaces that are smooth at rest stay smooth: the seam's control points follow those beside it.
 //
 // Across a seam of a clamped net the tangents are p/h (w1/w0) (P1 - P0) on one side and p/h' (w'/w0) (P0 - P') on the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A pool of threads that do the parts of one piece of work together.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // B-spline basis functions with derivatives. Nothing here allocates.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // closest_point(): descent from the local minima of a sampling, then a proof by subdivision that nothing is nearer.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Surfaces that close on themselves: a tube's first and last line of control points are one line of material.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Cubic splines that follow a path: the image of a curve under a map, a curve offset or pulled back.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The kinds of failure that a caller can tell apart. The program maps each to an exit code (README, "Exit codes").
 #pragma once
 

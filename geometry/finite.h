@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The door in front of every predicate: a number that isn't finite has no sign, no side and no order.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A control net fitted to scattered points of a surface whose parameters are known.
 #pragma once
 

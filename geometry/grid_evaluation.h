@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Many surface points at once. Points that share a span share its control points; points on a grid share their basis
 // values and, by sum factorisation, most of the sum too.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Knot vectors: the parameter line of every B-spline, its knots and spans.
 #pragma once
 

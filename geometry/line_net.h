@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of one knot vector, whatever hangs on it: the common core of refine.h for curves and for either direction of
 // a surface. Internal to geometry/.
 #pragma once

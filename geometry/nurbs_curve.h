@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // NURBS curves in the plane (parameter curves) and in space.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // NURBS surfaces: net, weights, evaluation with derivatives.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The Gauss-Legendre rule that lengths and areas of geometry/ are integrated with.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The sums under every surface evaluation. Internal to geometry/.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of representation that keep the geometry: knot insertion and removal, degree elevation, exact rebuild of flat
 // panels, Bezier extraction, splitting, reversal.
 #pragma once

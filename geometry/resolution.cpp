@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Refinement to analysis resolution: refine() and the flat affine case.
 #include <Eigen/Geometry>
 #include <Eigen/QR>

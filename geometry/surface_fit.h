@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Spline surfaces that interpolate a function of two parameters: offsets, and whatever else no NURBS is exactly.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A surface and the loops of parameter curves that bound its material: what one IGES face is, as data.
 #pragma once
 

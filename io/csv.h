@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Rows of a comma-separated table. [RFC 4180, with \n]
 #pragma once
 

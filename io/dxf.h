@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Pattern pieces from DXF in the style of AAMA and ASTM D6673, and plain drawings, read by dxflib. Built with TOILE_DXF
 // only.
 #pragma once

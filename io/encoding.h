@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Text of files that don't say how it is encoded, or say it in old ways.
 #pragma once
 

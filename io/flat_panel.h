@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Flat panels from plane outlines: what pattern files hold instead of surfaces.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One picture of a run in time, as plain data, and where pictures go.
 #pragma once
 

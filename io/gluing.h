@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels glued along their seams: is the garment a surface? Combinatorics only; of geometry it takes the lengths of
 // edges, which say where the ends of a 1:N seam's edges fall on the other side.
 #pragma once

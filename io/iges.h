@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // IGES 5.3: reading panels from any exporter's file, writing files that every system reads.
 #pragma once
 

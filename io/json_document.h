@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // JSON as a tree that knows its lines, so that what is wrong in a file can be found.
 #pragma once
 

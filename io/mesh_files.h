@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The material of panels as triangles, in formats that other programs read. (Wavefront OBJ stands in obj.h.)
 #pragma once
 

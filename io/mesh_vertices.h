@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What files of triangles say of a panel's vertices.
 #pragma once
 

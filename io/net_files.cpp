@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/net_files.h"
 
 #include <nlohmann/json.hpp>

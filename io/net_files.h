@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Control nets as text, for programs of one's own.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The loose curves of a drawing joined to closed chains by their ends.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What drawings do to an outline that isn't meant: edges drawn out and back, and little loops where ends overshoot.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From the loose curves of a pattern drawing to panels: what an outline-only IGES or a DXF file holds.
 #pragma once
 

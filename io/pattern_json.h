@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Sewing patterns as JSON: panels of line, quadratic, cubic and circle edges, their placement, and stitches.
 // Two dialects: Garment-Pattern-Generator (curvature = [x, y], origin at the body's centre of mass) and GarmentCode
 // (curvature = {type, params}, soles at y = 0). y points up, z forwards.

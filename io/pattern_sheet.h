@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A panel laid out on paper, for drawings and texture coordinates.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Trim curves as polylines on a surface, for drawing.
 #pragma once
 

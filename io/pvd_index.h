@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A ParaView collection (.pvd): files and their times.
 #pragma once
 

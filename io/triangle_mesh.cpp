@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/triangle_mesh.h"
 
 #include <assimp/postprocess.h>

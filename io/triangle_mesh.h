@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Triangle meshes from files: bodies and other obstacles.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Frames for ParaView: rational Bezier cells, trimmed triangles, control net, trims and constraint points.
 #pragma once
 

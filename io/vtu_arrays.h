@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The arrays of a VTU file, appended and compressed: what the writer packs and the reader unpacks.
 #pragma once
 

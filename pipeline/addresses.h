@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Addresses of places on a panel: corner:U,V | edge:u0 | curve:LOOP,K[,FROM,TO] | uv:U,V | cp:I,J | box:[..],[..].
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels against the body that shall wear them: how large it is where, and how much of them lies in it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Building a run from a scene: files read, panels refined, trims traced, model and loads made.
 #pragma once
 

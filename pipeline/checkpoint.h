@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A run on disk, to be taken up again by another process.
 #pragma once
 

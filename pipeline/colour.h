@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Colours of strain scales: light, evenly spaced to the eye.
 #pragma once
 

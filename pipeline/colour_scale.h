@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the colours of a field mean: the map, the bar beside a picture.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Messages of the program: to stderr, coloured and live only on a terminal.
 #pragma once
 

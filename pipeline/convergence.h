@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a row of finer and finer runs says: the limit, the order, the middle of repeats.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels from one file format to another: `toile convert`.
 #pragma once
 

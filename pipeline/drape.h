@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `toile drape` and `toile check`: a scene run, with its files.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Letters of the machine's fonts, where FreeType and fontconfig are at hand (TOILE_FONTS).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // history.csv: how a run went, a row a frame or a step.
 #pragma once
 

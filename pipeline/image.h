@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A picture in memory, lines and letters on it, and PNG bytes.
 #pragma once
 

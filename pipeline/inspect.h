@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What is in a panel file: entities, loops, cells, constraint points; for reading, for programs and as a drawing.
 #pragma once
 

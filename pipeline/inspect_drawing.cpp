@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The drawing of `toile inspect --svg`.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The page of `toile inspect --html`: one file, nothing loaded from elsewhere.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // JSON for files and pipes: valid whatever names the input has.
 #pragma once
 

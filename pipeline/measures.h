@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Numbers of a state: strains and stresses over the cloth, at constraint points, at asked points, reactions.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "geometry/error.h"
 #include "pipeline/preview.h"
 #include "pipeline/svg.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a run leaves behind: draped.igs, frames, the picture, the report.
 #pragma once
 

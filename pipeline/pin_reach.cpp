@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "pipeline/pin_reach.h"
 
 #include <fmt/format.h>

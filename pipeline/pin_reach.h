@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Pins that contradict the strain limit, found before a step is taken.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Plots as SVG: points on two logarithmic axes, and stacked bars.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A shaded picture of a frame: the cloth coloured by strain, for the eye.
 #pragma once
 

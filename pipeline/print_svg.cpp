@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels for the printer: one unit is a millimetre.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Another program, run to its end or to its limits.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The step loop: from the start to `until`, frame by frame, with energy and finiteness watched.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The scene file: what is draped, of what, held where, for how long. (README, "The scene file")
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // JSON schemas of scenes and studies, for editors that complete and check TOML. (README, "The scene file", "Studies")
 #pragma once
 

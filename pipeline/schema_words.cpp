@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Meaning and defaults of the keys of scenes and studies.
 #include <span>
 

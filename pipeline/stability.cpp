@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The verdict on a run: stable, refused, stopped or bad.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Letters made of strokes, for labels in pictures.
 #pragma once
 

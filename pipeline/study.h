@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A study: one scene run many times with something varied, each run a process of its own, judged against a reference
 // (kind "convergence") or for being stable, refused or stopped with a cause (kind "stability"). (README, "Studies")
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the runs of a study say together: references, errors, orders, checks.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // study.toml read and unfolded into its cases.
 #include <fmt/format.h>
 

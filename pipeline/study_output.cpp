@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A study's results as CSV, as a table, as JSON and as plots.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The runs of a study: a process each, with a record beside it that lets a later call go on.
 #include <fmt/format.h>
 

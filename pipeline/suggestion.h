@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // "Did you mean ...?": the nearest of the words that would have been right.
 #pragma once
 

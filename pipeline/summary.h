@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a drape says at its end: numbers, warnings, what to open, how to go on.
 #pragma once
 

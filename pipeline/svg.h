@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A drawing as SVG text: y downwards, numbers in pixels.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Drawings as pictures: filled and stroked polygons and letters, antialiased.
 #include <algorithm>
 #include <charconv>

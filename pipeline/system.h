@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The system that the step loop advances: a build with the pins that hold at some time.
 #pragma once
 

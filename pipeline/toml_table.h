@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // TOML tables as this program reads them: every key is asked for by name, and what nobody asked for is an error that
 // names file, line and the nearest key.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Quantities of a scene file: "2 mm", "120 g/m2", "1/30 s", "30 deg", "0.351 kg/(m2 s)".
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels of a plane drawing hung as they are worn: the grain, which runs along the warp, stands upright.
 #pragma once
 

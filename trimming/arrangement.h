@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The planar map of closed trim loops: cut where they meet; pieces that lie on each other are one edge.
 #pragma once
 

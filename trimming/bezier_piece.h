@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Parts of Bezier spans: halving, boxes, nearest places and crossings, all by construction.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The boundary of a cut cell's material as Bezier pieces in coordinates of its own, for integrals and triangles that
 // stay exact relative to the material however small it is.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The points at which strain is limited: knot-mesh vertices in the material and the meetings of trims with knot lines
 // [Peng & Zheng 2022, 3.4, Fig. 3].
 #pragma once

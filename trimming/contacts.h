@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where trim loops meet themselves or each other.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where a Bezier span meets the lines u = c and v = c: exact signs, isolated roots, exact order.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Loops as closed chains within the domain: the repairs that come before any decision about them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Loop validation: what must hold before anything is decided about a trimmed surface, and the repairs that make it so.
 #pragma once
 

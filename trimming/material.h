@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The region that the loops of a face bound: loops that cross, or share pieces, become loops that do neither.
 #pragma once
 

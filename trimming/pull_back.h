@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Pull-back: the parameter curve of a curve in space that lies on a surface.
 #pragma once
 

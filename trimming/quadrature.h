@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Quadrature over the material of a trimmed surface in its parameter plane.
 #pragma once
 

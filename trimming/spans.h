@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Bezier spans of trim curves: the curves that every decision of trimming/ is about.
 #pragma once
 

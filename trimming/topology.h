@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How the trim loops of a surface meet its knot lines: events, cells, vertices. Every decision here is exact (filtered
 // interval arithmetic with exact rationals and algebraic numbers behind it); only coordinates are rounded.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One triangle mesh of a trimmed panel, for looking at it, for contact and for models on triangles: Delaunay refinement
 // in the plane that the panel is rolled out into as well as an affine map can (a flat panel: exactly).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Exact winding numbers of points with respect to chains of Bezier spans.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Static equilibrium by dynamic relaxation with kinetic damping: steps without drag, halted whenever the kinetic energy
 // has passed a peak. [Cundall 1976; Barnes 1999]
 #pragma once

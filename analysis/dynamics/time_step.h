@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How large an explicit step may be: the largest eigenvalue of M^-1 K by Lanczos, with its residual as an upper bound.
 #pragma once
 

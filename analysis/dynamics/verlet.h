@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Velocity Verlet with projection, one step at a time. [Peng & Zheng 2022, eqs. 18-19, 24-34; Bridson et al. 2003]
 #pragma once
 

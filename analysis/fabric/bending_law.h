@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The bending law as the kernels evaluate it: for one number or for a pack of them. [Peng & Zheng 2022, eq. 9]
 #pragma once
 

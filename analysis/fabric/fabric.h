@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a cloth is made of: one table of numbers, and the two laws of the paper as functions of strain and curvature.
 #pragma once
 

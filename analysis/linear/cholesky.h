@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Sparse symmetric positive definite systems with a fixed pattern, analysed once, refactored at will: by an envelope
 // where its rows are short, else by supernodes in nested dissection.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Eight numbers in as many of the machine's registers as hold them. (A vector of eight that no register holds goes
 // through memory at each operation.)
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Sparse Cholesky by supernodes, multifrontal, factor and solves on several threads: subtrees of the elimination tree
 // don't meet before their common ancestors. [Duff & Reid 1983; Liu 1992]
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Strain rows whose vector y is a mean of tangents instead of one at a point.
 #pragma once
 

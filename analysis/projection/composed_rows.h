@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Constraint rows written on free nodes: d T and d G of every scalar row, the strain rows first, then the place rows.
 #pragma once
 

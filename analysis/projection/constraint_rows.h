@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Constraints as sparse scalar rows on control points: everything fast projection needs to know about a scene.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a time step asks of whatever meets its constraints: FastProjection or LagrangeNewton.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Continuum fast projection: moves a candidate state onto the constraints with the least change of kinetic energy.
 // [Peng & Zheng 2022, eqs. 29-36; Goldenthal et al. 2007]
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The constrained Lagrange problem of a step by Newton's method on places and multipliers together.
 // [Peng & Zheng 2022, eqs. 25-28]
 #pragma once

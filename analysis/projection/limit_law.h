@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The strain limit as a law: which strain a constraint force leaves. One row, local numbers.
 #pragma once
 

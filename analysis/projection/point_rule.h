@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Where strain is sampled for the limit. [Peng & Zheng 2022, 3.3, 3.4; analysis/README.md, "Sampling rules", has the
 // numbers that chose the default]
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The cloth that strain rows speak for: the weights with which their points integrate a stress.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The whole stress of cloth whose strain is limited: what the fabric carries and what the limit does. [Peng & Zheng
 // 2022, 3.5, eq. 37]
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Energy, force and tangent of the bending strip at one point of a kink (kink_strip.h).
 //
 //   a        derivative of the deformed place along the line, the same from both sides

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // C0 knot lines: the cloth goes on across them, so a bend there costs what bending a narrow strip of the same cloth
 // costs. [after the bending strips of Kiendl et al. 2010, with the angle itself in place of their fictitious surface]
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Surface functions differentiated along the fabric's rest directions instead of the parameters. [Peng & Zheng 2022,
 // eqs. 5-7 and the transformation of kappa]
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Energy, first and second derivatives of the shell at one material point, as functions of the derivatives of the
 // deformed place with respect to the fabric's rest coordinates (weft = 1, warp = 2). Local numbers in, local numbers
 // out; runs on double or Lanes.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Isogeometric Kirchhoff-Love cloth: energy, force and tangent of the panels of a scene. [Peng & Zheng 2022, eqs. 1-17]
 //
 // Degrees of freedom: q = positions of all control points [m], panel by panel, u fastest, xyz interleaved (3 n

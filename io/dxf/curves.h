@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Items of a piece as curves: where a polyline is several curves, so that seams and pins can name them.
 #pragma once
 

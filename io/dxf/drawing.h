@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A DXF file as blocks of items, by dxflib: what pieces are made of, in the file's own numbers.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Pieces drawn as one half of themselves, and pieces that are cut a second time, mirrored.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A DXF file as pairs of group code and value, cut down to what pieces are made of.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which pieces a drawing holds, in which size and unit.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 108 (plane), 190 (plane surface), 192 (cylinder), 194 (cone), 196 (sphere), 198 (torus).
 // [IGES 5.3, 4.12, 4.49 to 4.53]
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 124 (transformation), 212 (general note), 314 (colour), 406 forms 3 (what a level holds) and 15 (name).
 // [IGES 5.3, 4.21, 4.60, 4.77, 4.98]
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Boundaries of faces: 142, 141 and 508, all to the same curves.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 141 (boundary) and 143 (bounded surface). [IGES 5.3, 4.31, 4.33]
 #include "io/iges/topology.h"
 

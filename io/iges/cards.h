@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Directory cards and the assembly of a file from its records.
 #pragma once
 

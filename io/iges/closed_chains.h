@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One boundary record that holds several closed chains: both end circles of a tube, an outline with its holes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entity 104, conic arc. [IGES 5.3, 4.5]
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entity 126, rational B-spline curve. [IGES 5.3, 4.23]
 #include <Eigen/Dense>
 #include <algorithm>

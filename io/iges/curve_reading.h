@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Curves by pointer: composites flattened, matrices applied.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities one by one: each family has a file with its reader and its writer side by side; the table below names them.
 // To add one: a file in this folder, a row in table.cpp, a file in tests/corpus/iges.
 #pragma once

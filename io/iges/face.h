@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From a surface and the curves that bound it to panels: which curves to believe, seams, order and direction of loops.
 // Geometry only; records and pointers are the reader's.
 #pragma once

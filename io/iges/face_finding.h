@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which entities are faces, and where instances and solids put them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The parameter plane of a face: its surface, where it closes, and what counts as near.
 #pragma once
 

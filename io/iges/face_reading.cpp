@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/iges/face_reading.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Faces: 144, 143, 510, bounded planes (108 form 1), and surfaces that bound themselves.
 #pragma once
 

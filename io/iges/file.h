@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // An IGES file as it stands: sections, directory entries and parameter records, before anybody asks what they mean.
 // [IGES 5.3, section 2.2]
 #pragma once

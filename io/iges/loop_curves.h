@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Which curves of a boundary to believe, and their order and direction in the parameter plane.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Marks of panels (notches, grain lines, drill holes, lines, texts) as records: a group (402 form 7) holds a face and
 // its marks. A curve is a curve on the surface (142), a point a 116, a text a 212; a name (406 form 15) says the kind:
 // "notch", or "notch: V2" where the mark has words.

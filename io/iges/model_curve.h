@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The curve in space that a parameter curve draws on a surface: C(t) = S(c(t)).
 #pragma once
 

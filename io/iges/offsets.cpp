@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 130 (offset curve) and 140 (offset surface). [IGES 5.3, 4.25, 4.30]
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A drawing without any face: closed plane outlines are panels.
 #pragma once
 

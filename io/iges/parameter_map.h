@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From the parameters that the file means to those of the NURBS that a curve or surface became.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the file's parameters count: exporters disagree with the standard, and model curves tell.
 #pragma once
 

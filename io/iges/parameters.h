@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Parameters of a record: cut at delimiters, read as numbers and strings, errors with line, entity and what was
 // expected.
 #pragma once

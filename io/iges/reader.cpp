@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From records to panels: faces, or outlines where there are none; a bad face is left out.
 #include <map>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A file on its way from records to panels: pointers followed, matrices applied, and what becomes of every entity.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A file that was read, written again: from its bytes or from its model; and the proof that nothing was lost.
 #include <algorithm>
 #include <bit>

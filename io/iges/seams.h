@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Loops on closed surfaces: around them, across their seams, and beyond their domain by whole periods.
 #pragma once
 

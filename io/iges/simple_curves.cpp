@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 100 (circular arc), 106 (copious data), 110 (line), 102 (composite curve). [IGES 5.3, 4.3 to 4.7, 4.13]
 #include <cmath>
 #include <numbers>

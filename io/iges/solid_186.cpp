@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 186 (manifold solid), 514 (shell), 510 (face), 508 (loop), 504 (edge list), 502 (vertex list).
 // [IGES 5.3, 4.48, 4.147 to 4.151]
 #include "io/iges/topology.h"

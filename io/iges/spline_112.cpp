@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 112 (parametric spline curve) and 114 (parametric spline surface): polynomials in powers of the distance
 // from each breakpoint, at most cubic. Bernstein form is exact. [IGES 5.3, 4.14, 4.15]
 #include <algorithm>

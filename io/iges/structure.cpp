@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 116 (point), 123 (direction), 308 and 408 (subfigure and its instance), 402 (group).
 // [IGES 5.3, 4.16, 4.20, 4.75, 4.139, 4.81]
 #include "io/iges/topology.h"

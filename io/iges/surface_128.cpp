@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entity 128, rational B-spline surface. [IGES 5.3, 4.24]
 #include <algorithm>
 #include <string>

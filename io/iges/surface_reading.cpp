@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/iges/surface_reading.h"
 
 #include "geometry/error.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Surfaces by pointer, as NURBS where their matrices put them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Surfaces that are no B-spline in the file: their records, and the NURBS that they become with the map of the file's
 // parameters onto its own.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 118 (ruled surface), 120 (surface of revolution), 122 (tabulated cylinder). [IGES 5.3, 4.17, 4.18, 4.19]
 #include <algorithm>
 #include <cmath>

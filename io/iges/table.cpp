@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The dispatch table: every entity type that is known, with its reader and its writer.
 #include <algorithm>
 #include <array>

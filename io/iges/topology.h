@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What bounds faces and what groups them: records of pointers.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Entities 144 (trimmed surface) and 142 (curve on a surface). [IGES 5.3, 4.32, 4.34]
 #include "io/iges/entity.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Faces to records. Parameter curves are written as they are; model curves are made anew from the surface.
 #include <Eigen/Geometry>
 #include <algorithm>

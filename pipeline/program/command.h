@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How a command declares the words it takes. CLI11 stays inside command.cpp.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The panel file that a command line names; a scene or a study in its place is pointed to the command that takes it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // --size, --unit and --outline of the commands that read panel files.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The `toile` program: options in, exit code out.
 #pragma once
 

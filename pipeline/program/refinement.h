@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // --degree, --span and --spans of inspect and convert.
 #pragma once
 

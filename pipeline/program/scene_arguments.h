@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The scene that a command line names: a scene file, or a panel file and what holds it.
 #pragma once
 

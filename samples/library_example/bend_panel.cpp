@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Toile as a library: read a panel, look at its trim, roll its control net onto a cylinder, write it back trimmed.
 #include <cmath>
 #include <cstdio>

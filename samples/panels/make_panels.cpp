@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Drafts every panel file of the samples with the library itself: make_panels DIR writes DIR/<sample>/<panel>.igs.
 // The tests compare what it writes with what is committed.
 #include <Eigen/LU>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A flat polynomial unit square in x and y with everything that projection needs to know about it, without a shell
 // model.
 #pragma once

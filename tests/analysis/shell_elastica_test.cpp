@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A strip clamped level at one end bends under its own weight: the heavy elastica, with the linear bending law
 // (kappa0 = 0), twist = b0 so that the strip resists torsion, and a membrane stiff enough to count as inextensible.
 #include <Eigen/LU>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The shell's quadrature of p points a direction, against p + 1: what it sees, and how fast its error falls.
 #include <gtest/gtest.h>
 

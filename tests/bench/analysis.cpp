@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Costs of mechanics, one core. The shell: the cloth of example 4.1(a) on n x n control points of the unit square in a
 // rough state, (p+1)^2 Gauss points a cell; building the model is excluded. `per_point` is the time that the issue
 // bounds by 0.1 us at p = 2. The strain limit: one iteration, and its factors against others, on n x n control points

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the machine can do at most, and what kernels ask of it: floating-point operations (those of the laws counted
 // as they run, those of the sums over functions by hand) and bytes. bench_report divides one by the other.
 #include <benchmark/benchmark.h>

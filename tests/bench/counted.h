@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A number that counts the floating-point operations done on its kind, for kernels that run on any kind of number.
 #pragma once
 

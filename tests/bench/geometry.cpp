@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Speed of evaluation: surface points a second with first and second derivatives, one core. Basis tables are made
 // outside the loop for the grid (they are made once for a run), inside for the other two.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Speed of IGES: 100 trimmed faces with bicubic nets and four-curve loops, about 10 MB, one core. Reading starts from
 // the bytes in memory (a cold disk is not our speed) and ends with panels; limit 0.3 s, that is 33 MB/s.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // bench_large_iges WORK TOILE: IGES at size, each in a process of its own so that its peak memory is its own.
 //   parse: 200 MB of text (2,000 trimmed bicubic faces on 37 x 37 nets), from disk to panels, one core;
 //   inspect: 10,000 trimmed faces through `toile inspect --json`, the loops lines and curves, every other face with a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // bench_report SAMPLES BENCHMARKS.json...: the numbers that the project promises, each with its target, what it is
 // measured on and what is excluded. Reads what Google Benchmark wrote (medians), and times whole scenes itself. A
 // target that is missed is printed as such and is no error: machines differ.

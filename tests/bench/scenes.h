@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Whole scenes, timed: what no loop over one function can say.
 #pragma once
 

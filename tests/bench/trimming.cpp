@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Constraint points of a 200 x 200-span face with a trim of 500 spans: validation, tracing and listing, one core.
 // Making the face is excluded.
 #include <benchmark/benchmark.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A bicubic surface of garment size in millimetres that no two faces share: what the IGES benchmarks read and write.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // every_room SCENE.toml: runs a scene for a moment through the installed libraries; the linker needs every one.
 #include <cstdio>
 

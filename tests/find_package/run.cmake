@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 # cmake -D BUILD= -D CONFIG= -D SAMPLES= -D MAKE_PANELS= -D COMPILER= -D FLAGS= -D GENERATOR= -D MAKE_PROGRAM= -P run.cmake
 # Installs the build tree to a folder of its own, builds this folder's project against it and runs what comes out.
 function(run)

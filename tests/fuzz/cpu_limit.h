@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Processor time for each input: libFuzzer's own limit counts wall time, which says nothing on a busy machine. One
 // second is meant for the program as it ships; the instrumented one takes 10 to 20 times as long.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Any bytes as a DXF drawing: panels or an InputError, nothing else.
 #include "io/dxf.h"
 

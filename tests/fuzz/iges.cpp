@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Any bytes give panels or an InputError; what gives panels comes back exactly when its records are written anew.
 // tests/fuzz/run iges SECONDS
 #include "io/iges.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Evaluation allocates nothing: every call of operator new is counted here.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Arcs between two given points.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Evaluation of curves and surfaces.
 #include <cmath>
 #include <limits>

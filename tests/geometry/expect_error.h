@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // One check for errors that must say what is wrong.
 #pragma once
 

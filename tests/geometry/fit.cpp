@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Nets fitted to scattered points.
 #include "geometry/fit.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Random knot vectors, curves and surfaces for law tests. Every test states its seed with SCOPED_TRACE, so that a
 // failure prints it.
 #pragma once

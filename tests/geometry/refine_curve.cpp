@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of representation keep curves, in the plane and in space.
 #include <cmath>
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Changes of representation keep surfaces.
 #include "expect_error.h"
 #include "geometry/refine.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // refine(): resolution for the analysis.
 #include <numeric>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Pattern pieces in DXF: exact outlines, marks by layer, errors with their line.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Text of old files becomes UTF-8; what is UTF-8 stays.
 #include "io/encoding.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels glued along their seams: surfaces that everybody knows, and what is none.
 #include "io/gluing.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Closed chains among the curves of one boundary, told by their ends.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The files of tests/corpus/iges: each shows one thing that exporters do (its name says which).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Faces of every kind: their corpus files were made so that areas and places are known in closed form.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Loops that meet each other or the seam of a closed surface, from boundaries to panels.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What a pattern draws on its panels survives the way through an IGES file with faces.
 #include <gtest/gtest.h>
 

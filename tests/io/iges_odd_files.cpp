@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Files as nobody should write them, with the one answer that they can mean.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels as triangles, read back by assimp: an independent reader of every format.
 #include "io/mesh_files.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Files without faces: closed plane outlines are panels, what lies inside them belongs to them.
 #include <gtest/gtest.h>
 

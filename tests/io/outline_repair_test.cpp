@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Outlines as drawings hold them: what is drawn out and back goes as a slit, accidents are cut off, faults are named.
 #include "io/outline_repair.h"
 

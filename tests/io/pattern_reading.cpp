@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Sewing patterns: every edge is exactly the curve that the file names; what is wrong is named with its line.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Arrays of VTU files: packed, read back, damaged.
 #include "io/vtu_arrays.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Frames as VTU: what a reader finds in the bytes.
 #include <gtest/gtest.h>
 #include <zlib.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the step loop asks of the heap.
 #include <gtest/gtest.h>
 

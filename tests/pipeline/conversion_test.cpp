@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels to other files: which panels, on which triangles, which way up.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Surfaces of every pair of degrees, whole and trimmed, through all that reads a panel file.
 #include <gtest/gtest.h>
 

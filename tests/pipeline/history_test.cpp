@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // history.csv, row by row.
 #include "pipeline/history.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // `toile inspect` as functions: the contract of the JSON, the table and the drawing.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Small panels and scenes for the tests of this room, written anew into a folder of their own.
 #pragma once
 

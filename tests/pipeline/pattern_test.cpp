@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // From a pattern file to a scene, to other files and to paper.
 #include <gtest/gtest.h>
 #include <sys/wait.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The preview as a picture: pixels are read back from the PNG.
 #include <gtest/gtest.h>
 

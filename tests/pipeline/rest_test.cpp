@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Runs until rest, against shapes that are known otherwise.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The samples, run: each against the number that its README promises and where that number comes from.
 #include <gtest/gtest.h>
 

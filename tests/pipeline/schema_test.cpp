@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The schemas of scenes and studies against the readers, the samples and wrong files.
 #include "pipeline/schema.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What the program says on the screen: help, suggestions, what to do next.
 #include <gtest/gtest.h>
 #include <sys/wait.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // How often a test program has asked for memory. Takes the place of malloc, so it is linked into tests alone.
 #pragma once
 

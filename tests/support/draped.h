@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A small draped scene as plain data: what a frame holds, without running anything.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // A text with one to three bytes changed: what transfers and editors do to files.
 #pragma once
 

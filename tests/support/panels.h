@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Panels for tests of mechanics, without trims or with straight ones along the parameter axes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The list that `toile inspect` prints.
 #include "trims.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // The topology of a trim by brute force in exact rational arithmetic: Sturm chains, bisection, rays in general
 // position. Slow, and independent of trimming/: it shares the names of kinds with it and nothing else.
 #pragma once

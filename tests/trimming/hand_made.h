@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Cut cells made by hand: a surface of one knot span (or a few) over a rectangle, its trims and their topology as a
 // tracer would give them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // What crossings.h promises about the rounded coefficients of a span against a line.
 #include <gmpxx.h>
 #include <gtest/gtest.h>

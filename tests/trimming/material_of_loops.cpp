@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Loops that cross, share pieces or run out and back: what they bound, and that nothing else changes.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // No number that isn't finite passes the predicates' door, whoever brings it.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Quadrature on cut cells made by hand, against exact moments.
 #include <chrono>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Quadrature over traced trims: whole panels against closed forms.
 #include <algorithm>
 #include <cmath>

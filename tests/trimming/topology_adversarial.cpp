@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Random hard trims against exact arithmetic; `make verify` runs many more.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Random closed curves: the laws hold, and every answer agrees with dense sampling of the curve.
 #include <random>
 

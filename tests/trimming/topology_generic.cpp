@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Trims with nothing special about them.
 #include "trims.h"
 

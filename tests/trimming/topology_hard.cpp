@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Trims that touch, follow or barely miss knot lines; each also mirrored, turned, scaled, reversed and knot-refined.
 #include <numbers>
 

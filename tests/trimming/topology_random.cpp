@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Random trims on a coarse lattice, where lines, vertices and runs are hit all the time, against exact rational
 // arithmetic that shares nothing with the tracer.
 #include <boost/multiprecision/cpp_int.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes of trimmed panels.
 #include <cmath>
 #include <numbers>

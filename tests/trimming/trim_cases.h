@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Trims that are hard to trace, drawn at random: on coarse lattices, where lines, vertices, touches and runs are hit
 // all the time, and an ulp beside them; with what the tracer says of each compared to exact arithmetic.
 #pragma once

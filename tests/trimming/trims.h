@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Trimmed surfaces made by hand for tests of topology, and the laws that every traced one obeys.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // compare_with_occt FILE INSPECTION.json: the same file through OpenCASCADE's reader and through ours.
 //   faces, loops per face: equal; area per face: within 1e-6; largest |C3(t) - S(c(t))| over all edges: not above the
 //   resolution that the file states (IGES global field 19).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // occt_areas [--fine] FILE: the area of every face that OpenCASCADE reads from an IGES file, one a line [m2]; --fine
 // takes ten digits instead of four, and its time.
 #include <BRepGProp.hxx>

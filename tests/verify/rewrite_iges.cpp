@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // rewrite_iges [--faces] IN OUT: read, and write every known record from the model instead of replaying it; with
 // --faces a new file of nothing but the panels, as a drape writes them.
 #include <cstdio>

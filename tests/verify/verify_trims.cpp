@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
 // verify_trims [CASES [FIRST]]: hard random trims against exact arithmetic, seeds FIRST, FIRST + 1, ... Prints what is
 // decided wrong and the slowest case, and exits 1 where anything is wrong or a case doesn't end.
 #include <algorithm>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """IGES files written from their standard alone: no code of the program, no numbers of its output."""
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Parts of a parameter plane: the curves that bound them, and their area on a surface by adaptive quadrature."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Surfaces as the IGES standard defines them: a formula of the file's own parameters, and the record that says it.
 
 Every surface has at(u, v), its domain (u0, u1, v0, v1), breaks (where it is less smooth) and write(writer). Formulas

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """blender_meshes.py -- WORK STEM: Blender imports WORK/STEM.glb and .obj.
 
 Objects by the panels' names, areas those of the file, upright, texture coordinates in the unit square and the flat and

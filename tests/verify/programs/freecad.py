@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """freecad.py FILE.igs INSPECTION.json NET.csv NAME: FreeCAD imports the file without a window.
 
 One object called NAME with every face of ours: areas within 2e-5 (as FreeCAD integrates), boxes within those of the nets. Flat panels of a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """meshio_meshes.py WORK STEM: meshio reads WORK/STEM.ply, .stl, .obj and .vtu; all hold the same triangles."""
 import json
 import os

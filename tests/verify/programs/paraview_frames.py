@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """paraview_frames.py FRAMES NAME WORK: ParaView opens the two indices of a run.
 
 NAME.pvd shows triangles alone, coloured by strain as it opens; NAME_parts.pvd has five blocks, Bezier cells among them.
