@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "analysis/extension.h"
 #include "analysis/projection/averaged_rows.h"
@@ -82,29 +83,19 @@ void refuse_tears(const NurbsSurface& surface, const std::string& who) {
   }
 }
 
-// Surfaces at analysis resolution, unit of the file.
-NurbsSurface refined(const TrimmedSurface& source, const ScenePanel& panel, const std::string& who,
-                     std::vector<std::string>& warnings) {
-  NurbsSurface surface = source.surface;
-  if (!surface.u().clamped() || !surface.v().clamped()) {
-    surface = clamp(surface);
+// The surface at analysis resolution, unit of the file.
+NurbsSurface analysis_surface(const TrimmedSurface& source, const ScenePanel& panel, const std::string& who,
+                              std::vector<std::string>& warnings) {
+  if (!source.surface.u().clamped() || !source.surface.v().clamped())
     warnings.push_back(who + ": its knots were clamped");
-  }
+  RefineOptions options;
   if (!panel.start) {
-    RefineOptions options;
     options.degree = panel.degree.value_or(2);
     if (panel.span) options.span = *panel.span / source.metres_per_unit;
     options.spans = panel.spans;
     options.control_points = panel.control_points;
-    options.tolerance = same_place(source.resolution, surface);
-    Refinement refinement;
-    try {
-      refinement = refine(surface, options);
-    } catch (const GeometryError& error) {
-      throw GeometryError(fmt::format("{}: {}", who, error.what()));
-    }
-    surface = std::move(refinement.surface);
   }
+  NurbsSurface surface = refined(source, options, who);
   refuse_tears(surface, who);
   return surface;
 }
@@ -113,18 +104,10 @@ char letter(Direction d) {
   return d == Direction::u ? 'u' : 'v';
 }
 
-// Glues the seams of a closed surface where cloth lies on both of their sides. A seam that is trimmed apart all along
-// is no seam of the cloth.
-void close_seams(BuiltPanel& built, const std::string& who, std::vector<std::string>& warnings) {
-  NurbsSurface& surface = built.face.surface;
+void warn_of_seams(const BuiltPanel& built, const std::string& who, std::vector<std::string>& warnings) {
+  const NurbsSurface& surface = built.face.surface;
   const double tolerance = same_place(built.source.resolution, surface);
   const Closure ends = find_closure(surface, tolerance);
-  for (const KinkPoint& point : kink_points(built.face, built.topology, ends)) {
-    if (point.at != surface.knots(point.direction).domain().min) continue;
-    (point.direction == Direction::u ? built.closure.u : built.closure.v) = true;
-  }
-  surface = close_exactly(surface, built.closure);
-  built.leader = seam_leaders(surface, built.closure);
   for (const Direction d : {Direction::u, Direction::v}) {
     if (!ends_meet(surface, d, tolerance)) continue;
     const Interval domain = surface.knots(d).domain();
@@ -226,25 +209,18 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule
   BuiltPanel& built = parts.built;
   built.name = panel.name;
   built.source = select_face(file, panel);
-  built.face = built.source;
-  if (built.face.name.empty()) built.face.name = panel.name;
-  built.face.surface = refined(built.source, panel, who, warnings);
-  const double unit = built.face.metres_per_unit;
-  built.repairs = validate_loops(built.face);
+  TrimmedSurface face = built.source;
+  if (face.name.empty()) face.name = panel.name;
+  face.surface = analysis_surface(built.source, panel, who, warnings);
+  const double unit = face.metres_per_unit;
+  static_cast<PanelTrace&>(built) = trace_panel(std::move(face), sampling);
   for (const LoopRepair& repair : built.repairs) {
     (repair.note ? notes : warnings).push_back(fmt::format("{}: loop {}: {}", who, repair.loop, repair.what));
   }
-  built.topology = trace_trims(built.face);
-  close_seams(built, who, warnings);
+  warn_of_seams(built, who, warnings);
   refuse_poles(built, who);
   CutQuadrature rule = quadrature(built.face, built.topology, shell_quadrature(built.face.surface));
   if (!(rule.area > 0)) throw GeometryError(who + ": the trim leaves no material");
-  built.points = constraint_points(built.face, built.topology);
-  built.extra_points = apply_rule(sampling, built.face, built.topology, built.points, built.closure);
-  for (auto* points : {&built.points, &built.extra_points}) {
-    merge_over_seams(built.face.surface, built.closure, *points);
-  }
-
   const NurbsSurface rest = placed(built.face.surface, unit, panel.place);
   Extension extension = extend(rest, rule, row_sums(rest, rule, panel.fabric.density), {}, built.leader);
   built.carries_cloth = extension.carries_cloth;
@@ -285,10 +261,6 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule
 
 }  // namespace
 
-double same_place(double resolution, const NurbsSurface& surface) {
-  return std::max(resolution, 1e-9 * bounding_box(surface).diagonal().norm());
-}
-
 int Build::panel(const std::string& name) const {
   for (std::size_t k = 0; k < panels.size(); ++k) {
     if (panels[k].name == name) return static_cast<int>(k);
@@ -314,7 +286,9 @@ Build build(Scene scene) {
            !(it->path == path && choices[static_cast<std::size_t>(it - result.files.begin())] == panel.choice))
       ++it;
     if (it == result.files.end()) {
-      result.files.push_back(read_panels(panel.file, panel.choice));
+      const std::shared_ptr<const ReadFile>& read = result.scene.read;
+      const bool known = read && read->file.path == path && read->choice == panel.choice;
+      result.files.push_back(known ? read->file : read_panels(panel.file, panel.choice));
       result.files.back().path = path;
       choices.push_back(panel.choice);
       for (const std::string& warning : result.files.back().warnings) result.warnings.push_back(warning);

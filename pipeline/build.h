@@ -12,33 +12,23 @@
 #include "analysis/projection/constraint_rows.h"
 #include "analysis/shell/shell_model.h"
 #include "analysis/smooth_seam.h"
-#include "geometry/closure.h"
 #include "geometry/trimmed_surface.h"
 #include "io/iges.h"
 #include "pipeline/scene.h"
-#include "trimming/constraint_points.h"
-#include "trimming/loops.h"
-#include "trimming/topology.h"
+#include "pipeline/trace_panel.h"
 
 namespace toile {
 
 // One panel, ready. `source` has the file's own numbers and trims; `face` the refined surface and valid loops, both in
 // the file's unit. Control points of `face`, of the model and of the output are the same ones, in the same order.
-struct BuiltPanel {
+struct BuiltPanel : PanelTrace {  // `extra_points` with those at pinned uv points
   std::string name;
   TrimmedSurface source;
-  TrimmedSurface face;
-  TrimTopology topology;
-  std::vector<ConstraintPoint> points;        // the listed ones
-  std::vector<ConstraintPoint> extra_points;  // of the projection only: by strain_limit.points, and at pinned uv points
-  std::vector<StrainRow> mean_rows;           // by strain_limit.points: averaged_rows()
-  std::vector<LoopRepair> repairs;
-  Closure closure;                  // directions in which the surface closes on itself: glued at its seam
-  std::vector<int> leader;          // per control point: the one that stands for it, see seam_leaders()
-  SmoothSeams smooth_seams;         // where the seam's control points follow those beside it
-  std::vector<bool> carries_cloth;  // per control point
-  std::vector<int> extended;        // control points with too little cloth that follow their neighbours
-  double extension_deviation = 0;   // m, of the rest surface inside the material
+  std::vector<StrainRow> mean_rows;  // by strain_limit.points: averaged_rows()
+  SmoothSeams smooth_seams;          // where the seam's control points follow those beside it
+  std::vector<bool> carries_cloth;   // per control point
+  std::vector<int> extended;         // control points with too little cloth that follow their neighbours
+  double extension_deviation = 0;    // m, of the rest surface inside the material
 };
 
 // Everything of a run that doesn't change with pins being released.
@@ -62,9 +52,6 @@ struct Build {
   // A panel's net out of the control points of all panels [m].
   Eigen::Matrix3Xd net(int panel, const Eigen::VectorXd& q) const;
 };
-
-// Length below which two places of a file are one: what the file says, at least 1e-9 of the surface's size.
-double same_place(double resolution, const NurbsSurface& surface);
 
 // Throws InputError (files, names), GeometryError (panel, loop, place; pin or traction on a trimmed-away place).
 Build build(Scene scene);

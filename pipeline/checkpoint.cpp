@@ -8,6 +8,8 @@
 #include <concepts>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
+#include <map>
 
 #include "geometry/error.h"
 #include "io/file.h"
@@ -205,10 +207,14 @@ SceneMark scene_mark(const Build& build) {
     if (of_the_end || key == "output" || key.starts_with("output.")) continue;
     mark.keys[key] = value;
   }
+  std::map<std::filesystem::path, std::string> contents;  // each file is read once
   for (std::size_t k = 0; k < build.scene.panels.size(); ++k) {
-    const std::string text = read_file(build.scene.panels[k].file);
-    mark.keys[fmt::format("panel.{}.file", k)] =
-        fmt::format("a file of {} bytes ({:016x})", text.size(), checksum(text));
+    std::string& content = contents[build.scene.panels[k].file];
+    if (content.empty()) {
+      const std::string text = read_file(build.scene.panels[k].file);
+      content = fmt::format("a file of {} bytes ({:016x})", text.size(), checksum(text));
+    }
+    mark.keys[fmt::format("panel.{}.file", k)] = content;
   }
   mark.control_points = checksum(bytes_of(build.start)) ^ (checksum(bytes_of(build.model->lumped_mass())) << 1);
   return mark;

@@ -114,11 +114,12 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   for (std::size_t k = 0; k < built.panels.size(); ++k) console.detail(describe(built, k));
   // What can be refused is refused before anything is written.
   RunResult result;
+  std::unique_ptr<System> start_system;
   if (options.resume) {
     result = read_checkpoint(*options.resume, built);
     require_time_left(built, result);
   } else {
-    assemble(built, 0);
+    start_system = assemble(built, 0);
   }
   const bool goes_on = options.resume && holds(directory, *options.resume);
   if (!goes_on) prepare_directory(directory, options.overwrite);
@@ -170,7 +171,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
     console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {} left", 100 * p.time / p.until,
                              p.time, p.until, p.steps, p.dt, duration(since(start) * (p.until - p.time) / gone)));
   };
-  result = result.system ? run(built, std::move(result), hooks) : run(built, hooks);
+  result = result.system ? run(built, std::move(result), hooks) : run(built, std::move(start_system), hooks);
   console.end_live();
   for (const std::string& warning : result.warnings) console.warning(warning);
   if (result.accepted) {

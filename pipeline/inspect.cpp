@@ -8,19 +8,16 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <nlohmann/json.hpp>
+#include <functional>
 #include <optional>
 #include <set>
 #include <thread>
 
-#include "analysis/extension.h"
-#include "analysis/projection/point_rule.h"
 #include "analysis/projection/select_rows.h"
 #include "analysis/workers.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
-#include "pipeline/build.h"
-#include "pipeline/json_text.h"
+#include "pipeline/inspect_facts.h"
 #include "pipeline/places.h"
 
 namespace toile {
@@ -84,28 +81,24 @@ std::vector<std::string> repair_lines(const std::vector<LoopRepair>& repairs, bo
   return out;
 }
 
-InspectedPanel inspect(const TrimmedSurface& source, const InspectOptions& options) {
+}  // namespace
+
+InspectedPanel inspect(TrimmedSurface face, const InspectOptions& options) {
   InspectedPanel panel;
-  panel.face = source;
-  panel.face.surface = refined(source, options);
-  for (const TrimLoop& loop : panel.face.loops) panel.gaps.emplace_back(loop.index, gap(loop));
+  face.surface = refined(face, options);
+  for (const TrimLoop& loop : face.loops) panel.gaps.emplace_back(loop.index, gap(loop));
+  static_cast<PanelTrace&>(panel) = trace_panel(std::move(face), PointRule::knot_mesh);
   const std::string who = fmt::format("panel '{}'", panel.face.name);
-  panel.repairs = validate_loops(panel.face);
   for (const bool notes : {false, true}) {
     for (const std::string& line : repair_lines(panel.repairs, notes))
       (notes ? panel.notes : panel.warnings).push_back(fmt::format("{}: {}", who, line));
   }
-  panel.topology = trace_trims(panel.face);
-  panel.points = constraint_points(panel.face, panel.topology);
   panel.measure = measure(panel.face, panel.topology);
   panel.active_control_points = active_control_points(panel.face.surface, panel.topology);
-  const Closure closure = find_closure(panel.face.surface, same_place(panel.face.resolution, panel.face.surface));
-  merge_over_seams(close_exactly(panel.face.surface, closure), closure, panel.points);
   merge_near_points(panel.face.surface, panel.points);
   return panel;
 }
 
-// Loops by the file's number, with their length [unit of the net].
 std::vector<std::pair<const TrimLoop*, double>> loops_in_file_order(const InspectedPanel& panel) {
   std::vector<std::pair<const TrimLoop*, double>> loops;
   for (std::size_t k = 0; k < panel.face.loops.size(); ++k) {
@@ -146,57 +139,7 @@ std::ptrdiff_t count_cells(const InspectedPanel& panel, CellKind kind) {
   return std::ranges::count(panel.topology.cells, kind);
 }
 
-Eigen::Vector3d position(const InspectedPanel& panel, double u, double v) {
-  return panel.face.metres_per_unit * panel.face.surface(u, v);
-}
-
-nlohmann::ordered_json panel_json(const InspectedPanel& panel) {
-  using Json = nlohmann::ordered_json;
-  const NurbsSurface& surface = panel.face.surface;
-  const Interval du = surface.u().domain(), dv = surface.v().domain();
-  Json out = {{"name", utf8(panel.face.name)},
-              {"degree", {surface.u().degree(), surface.v().degree()}},
-              {"control_points", {surface.count_u(), surface.count_v()}},
-              {"rational", surface.rational()},
-              {"knots", Json::array({surface.u().knots(), surface.v().knots()})},
-              {"domain", Json::array({{du.min, du.max}, {dv.min, dv.max}})},
-              {"area", area(panel)},
-              {"perimeter", perimeter(panel)},
-              {"loops", Json::array()}};
-  for (const auto& [loop, length] : loops_in_file_order(panel)) {
-    out["loops"].push_back({{"kind", name(loop->kind)},
-                            {"curves", curves_in_file(*loop)},
-                            {"length", length * panel.face.metres_per_unit},
-                            {"closed", true},
-                            {"gap", gap_as_read(panel, loop->index)}});
-  }
-  out["cells"] = {{"inside", count_cells(panel, CellKind::inside)},
-                  {"cut", count_cells(panel, CellKind::cut)},
-                  {"outside", count_cells(panel, CellKind::outside)}};
-  out["active_control_points"] = panel.active_control_points;
-  const PredicateCounts& counts = panel.topology.counts;  // how often each level of arithmetic decided
-  out["predicates"] = {{"signs", counts.coefficient_signs},
-                       {"interval", counts.interval},
-                       {"exact", counts.exact},
-                       {"algebraic", counts.algebraic}};
-  if (!panel.face.marks.empty()) out["marks"] = Json::array();
-  for (const PanelMark& mark : panel.face.marks)
-    out["marks"].push_back({{"kind", name(mark.kind)}, {"at", {mark.at.x(), mark.at.y()}}, {"text", utf8(mark.text)}});
-  out["constraint_points"] = Json::array();
-  for (const ConstraintPoint& point : panel.points) {
-    const Eigen::Vector3d x = position(panel, point.u, point.v);
-    Json row = {{"kind", name(point.kind)}, {"u", point.u}, {"v", point.v}, {"position", {x[0], x[1], x[2]}}};
-    if (point.loop >= 0) {
-      row["loop"] = point.loop;
-      row["curve"] = point.curve;
-      row["t"] = point.t;
-    }
-    row["used"] = point.used;
-    if (!point.used) row["why"] = point.why;
-    out["constraint_points"].push_back(std::move(row));
-  }
-  return out;
-}
+namespace {
 
 // ---- text ----
 
@@ -283,74 +226,78 @@ std::string points_text(const InspectedPanel& panel) {
 }  // namespace
 
 NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options) {
-  NurbsSurface surface = face.surface;
-  if (!surface.u().clamped() || !surface.v().clamped()) surface = clamp(surface);
-  if (!options.degree && !options.span && !options.spans) return surface;
-  RefineOptions refinement;
-  refinement.degree = options.degree;
-  if (options.span) refinement.span = *options.span / face.metres_per_unit;
-  if (options.spans) refinement.spans = {*options.spans, *options.spans};
-  refinement.tolerance = same_place(face.resolution, surface);
-  try {
-    return refine(surface, refinement).surface;
-  } catch (const GeometryError& error) {
-    throw GeometryError(fmt::format("{}: panel '{}': {}", face.source, face.name, error.what()));
-  }
+  RefineOptions asked;
+  asked.degree = options.degree;
+  if (options.span) asked.span = *options.span / face.metres_per_unit;
+  if (options.spans) asked.spans = {*options.spans, *options.spans};
+  return refined(face, asked, fmt::format("{}: panel '{}'", face.source, face.name));
 }
 
-namespace {
-
-// body(k) for every k below `count`, each by the first thread that is free; what each threw.
-template <class Body>
-std::vector<std::exception_ptr> deal_out(std::size_t count, int threads, const Body& body) {
+std::vector<std::exception_ptr> each_panel(std::size_t count, int threads,
+                                           const std::function<void(std::size_t)>& body) {
   if (threads <= 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   std::vector<std::exception_ptr> errors(count);
   Workers(static_cast<int>(std::min<std::size_t>(threads, count))).run(static_cast<int>(count), [&](int part) {
     const auto k = static_cast<std::size_t>(part);
     try {
       body(k);
-    } catch (...) {
+    } catch (const GeometryError&) {
       errors[k] = std::current_exception();
     }
   });
   return errors;
 }
 
-}  // namespace
-
-Inspection inspect(const PanelFile& file, const InspectOptions& options) {
-  Inspection out;
-  out.file = file.path;
-  out.unit = file.unit;
-  out.exporter = file.exporter;
-  out.entities = file.entities;
-  out.warnings = file.warnings;
-  out.notes = file.notes;
-  out.refused = file.refused;
-  out.size = file.size;
-  out.sizes = file.sizes;
-  out.ledger = file.ledger;
-  std::vector<std::optional<InspectedPanel>> panels(file.panels.size());
-  const std::vector<std::exception_ptr> errors =
-      deal_out(panels.size(), options.threads, [&](std::size_t k) { panels[k] = inspect(file.panels[k], options); });
-  for (std::size_t k = 0; k < panels.size(); ++k) {
+std::vector<std::string> refusals(std::vector<std::string> refused, const std::vector<std::exception_ptr>& errors) {
+  std::size_t failed = 0;
+  for (const std::exception_ptr& error : errors) {
+    if (!error) continue;
+    ++failed;
     try {
-      if (errors[k]) std::rethrow_exception(errors[k]);
-    } catch (const GeometryError& error) {
-      if (panels.size() == 1) throw;
-      out.refused.emplace_back(error.what());
-      continue;
+      std::rethrow_exception(error);
+    } catch (const GeometryError& of_panel) {
+      refused.emplace_back(of_panel.what());
     }
-    out.warnings.insert(out.warnings.end(), panels[k]->warnings.begin(), panels[k]->warnings.end());
-    out.notes.insert(out.notes.end(), panels[k]->notes.begin(), panels[k]->notes.end());
-    out.panels.push_back(*std::move(panels[k]));
-    panels[k].reset();
   }
-  if (out.panels.empty() && !out.refused.empty()) throw GeometryError(out.refused.front());
+  if (!refused.empty() && failed == errors.size()) throw GeometryError(refused.front());
+  return refused;
+}
+
+Inspection facts_of(PanelFile file) {
+  Inspection out;
+  out.file = std::move(file.path);
+  out.unit = std::move(file.unit);
+  out.exporter = std::move(file.exporter);
+  out.entities = std::move(file.entities);
+  out.ledger = std::move(file.ledger);
+  out.warnings = std::move(file.warnings);
+  out.notes = std::move(file.notes);
+  out.size = std::move(file.size);
+  out.sizes = std::move(file.sizes);
+  out.refused = std::move(file.refused);
   return out;
 }
 
-namespace {
+void append_messages(const InspectedPanel& panel, Inspection& facts) {
+  facts.warnings.insert(facts.warnings.end(), panel.warnings.begin(), panel.warnings.end());
+  facts.notes.insert(facts.notes.end(), panel.notes.begin(), panel.notes.end());
+}
+
+Inspection inspect(PanelFile file, const InspectOptions& options) {
+  std::vector<TrimmedSurface> faces = std::move(file.panels);
+  Inspection out = facts_of(std::move(file));
+  std::vector<std::optional<InspectedPanel>> panels(faces.size());
+  out.refused = refusals(std::move(out.refused), each_panel(panels.size(), options.threads, [&](std::size_t k) {
+                           panels[k] = inspect(std::move(faces[k]), options);
+                         }));
+  for (std::optional<InspectedPanel>& panel : panels) {
+    if (!panel) continue;
+    append_messages(*panel, out);
+    out.panels.push_back(*std::move(panel));
+    panel.reset();
+  }
+  return out;
+}
 
 const char* name(Disposition disposition) {
   switch (disposition) {
@@ -364,22 +311,6 @@ const char* name(Disposition disposition) {
       return "quarantined";
   }
   return "";
-}
-
-}  // namespace
-
-nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger) {
-  nlohmann::ordered_json out = nlohmann::ordered_json::array();
-  for (const LedgerEntry& entry : ledger) {
-    nlohmann::ordered_json row = {{"entry", entry.sequence},
-                                  {"line", entry.line},
-                                  {"entity", entry.type},
-                                  {"form", entry.form},
-                                  {"disposition", name(entry.disposition)}};
-    if (!entry.why.empty()) row["why"] = utf8(entry.why);
-    out.push_back(std::move(row));
-  }
-  return out;
 }
 
 std::string ledger_text(const std::vector<LedgerEntry>& ledger) {
@@ -402,32 +333,6 @@ std::string ledger_text(const std::vector<LedgerEntry>& ledger) {
     out += '\n';
   }
   return out;
-}
-
-nlohmann::ordered_json inspect_json(const Inspection& inspection, int threads) {
-  nlohmann::ordered_json entities = nlohmann::ordered_json::object();
-  for (const auto& [type, count] : inspection.entities) entities[std::to_string(type)] = count;
-  nlohmann::ordered_json panels = std::vector<nlohmann::ordered_json>(inspection.panels.size());
-  for (const std::exception_ptr& error :
-       deal_out(panels.size(), threads, [&](std::size_t k) { panels[k] = panel_json(inspection.panels[k]); }))
-    if (error) std::rethrow_exception(error);
-  nlohmann::ordered_json warnings = nlohmann::ordered_json::array();
-  for (const std::string& warning : inspection.warnings) warnings.push_back(utf8(warning));
-  nlohmann::ordered_json notes = nlohmann::ordered_json::array();
-  for (const std::string& note : inspection.notes) notes.push_back(utf8(note));
-  nlohmann::ordered_json refused = nlohmann::ordered_json::array();
-  for (const std::string& panel : inspection.refused) refused.push_back(utf8(panel));
-  return {{"file", utf8(inspection.file)},
-          {"unit", utf8(inspection.unit)},
-          {"exporter", utf8(inspection.exporter)},
-          {"warnings", std::move(warnings)},
-          {"size", inspection.size},
-          {"sizes", inspection.sizes},
-          {"notes", std::move(notes)},
-          {"entities", std::move(entities)},
-          {"panels", std::move(panels)},
-          {"refused", std::move(refused)},
-          {"ledger", ledger_json(inspection.ledger)}};
 }
 
 std::string inspect_text(const Inspection& inspection, bool points) {

@@ -9,12 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/refine.h"
 #include "io/iges.h"
-#include "trimming/constraint_points.h"
-#include "trimming/loops.h"
+#include "pipeline/trace_panel.h"
 #include "trimming/quadrature.h"
-#include "trimming/topology.h"
 
 namespace toile {
 
@@ -29,14 +26,10 @@ struct InspectOptions {
 // The face's surface, clamped, with these degrees and knots. Throws GeometryError where they can't be had.
 NurbsSurface refined(const TrimmedSurface& face, const InspectOptions& options);
 
-struct InspectedPanel {
-  TrimmedSurface face;  // refined as asked, loops valid
-  TrimTopology topology;
-  std::vector<ConstraintPoint> points;
+struct InspectedPanel : PanelTrace {         // refined as asked; points: those of the knot mesh
   PanelMeasure measure;                      // unit of the net
   int active_control_points = 0;             // their support meets the material
   std::vector<std::pair<int, double>> gaps;  // loop of the file, largest gap as read [parameter plane]
-  std::vector<LoopRepair> repairs;
   std::vector<std::string> warnings;
   std::vector<std::string> notes;  // repairs that say nothing against the file
 };
@@ -54,7 +47,7 @@ struct Inspection {
 };
 
 // Throws GeometryError where no panel has a valid trim, with panel, loop and place of the first.
-Inspection inspect(const PanelFile& file, const InspectOptions& options = {});
+Inspection inspect(PanelFile file, const InspectOptions& options = {});
 
 // The ledger by kind of entity and what became of it, with the first reason and its line (empty for a file
 // without entities); for programs, every entity.
@@ -63,8 +56,15 @@ nlohmann::ordered_json ledger_json(const std::vector<LedgerEntry>& ledger);
 
 // A table of the panels and their curves; `points`: with the constraint points one by one.
 std::string inspect_text(const Inspection& inspection, bool points = false);
-// Lengths in metres, areas in square metres, parameters as in the file; threads as in InspectOptions.
-nlohmann::ordered_json inspect_json(const Inspection& inspection, int threads = 0);
+// One object, for programs: lengths in metres, areas in square metres, parameters as in the file.
+std::string inspect_json_text(const Inspection& inspection);
+nlohmann::ordered_json inspect_json(const Inspection& inspection);
+// The same text as inspect() and inspect_json_text() make, in pieces, but each panel is let go once its text is there:
+// for files whose panels take more memory than their text.
+struct InspectionText {
+  std::vector<std::string> pieces, refused;
+};
+InspectionText inspect_to_json(PanelFile file, const InspectOptions& options = {});
 std::string inspect_svg(const Inspection& inspection);
 std::string inspect_png(const Inspection& inspection);   // the same drawing
 std::string inspect_html(const Inspection& inspection);  // a page of its own: the drawing, tables, warnings

@@ -51,6 +51,9 @@ class Loop {
       : build_(build), scene_(build.scene), hooks_(hooks), result_(std::move(from)) {
     result_.from = result_.state.t;
   }
+  Loop(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks) : Loop(build, RunResult(), hooks) {
+    start_system_ = std::move(start);
+  }
 
   RunResult operator()() {
     if (result_.system) {
@@ -88,7 +91,7 @@ class Loop {
 
  private:
   void begin() {
-    result_.system = assemble(build_, 0);
+    result_.system = start_system_ ? std::move(start_system_) : assemble(build_, 0);
     result_.warnings = result_.system->warnings;
     warn_of_stiff_limit();
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(build_.start.size());
@@ -473,6 +476,7 @@ class Loop {
   const Build& build_;
   const Scene& scene_;
   const RunHooks& hooks_;
+  std::unique_ptr<System> start_system_;  // null: begin() assembles it
   RunResult result_;
   const double tolerance_ = rest_tolerance(build_);
   const double pins_done_ = pins_done();
@@ -538,7 +542,11 @@ void require_time_left(const Build& build, const RunState& state) {
 }
 
 RunResult run(const Build& build, const RunHooks& hooks) {
-  return Loop(build, {}, hooks)();
+  return Loop(build, RunResult(), hooks)();
+}
+
+RunResult run(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks) {
+  return Loop(build, std::move(start), hooks)();
 }
 
 RunResult run(const Build& build, RunResult from, const RunHooks& hooks) {

@@ -124,6 +124,8 @@ double rest_tolerance(const Build& build);
 // its own, or as check_failed after max_steps.
 // The step is deterministic: no decision depends on time of day, addresses or thread count.
 RunResult run(const Build& build, const RunHooks& hooks = {});
+// The same with what assemble(build, 0) gave.
+RunResult run(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks = {});
 
 // Goes on from a run of the same build (read_checkpoint): the end is that of a run that never stopped, to the bit,
 // unless `until` or `every` are others now. Throws InputError where `until` has passed already.

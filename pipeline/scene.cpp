@@ -680,7 +680,9 @@ std::optional<double> draping_span(const TrimmedSurface& face) {
 }  // namespace
 
 Scene quick_scene(const QuickScene& request, std::span<const std::string> settings) {
-  const PanelFile file = read_panels(request.file, request.choice);
+  const auto read =
+      std::make_shared<const ReadFile>(ReadFile{read_panels(request.file, request.choice), request.choice});
+  const PanelFile& file = read->file;
   const auto has = [&](const std::string& name) {
     return std::ranges::any_of(file.panels, [&](const TrimmedSurface& face) { return face.name == name; });
   };
@@ -688,6 +690,7 @@ Scene quick_scene(const QuickScene& request, std::span<const std::string> settin
     return name.size() > suffix.size() && std::string_view(name).substr(name.size() - suffix.size()) == suffix;
   };
   Scene scene;
+  scene.read = read;
   scene.path = request.file;
   scene.name = request.file.stem().string();
   scene.strain_limit.on = true;

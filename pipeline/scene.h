@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,6 +14,7 @@
 #include "analysis/fabric/fabric.h"
 #include "analysis/projection/fast_projection.h"
 #include "analysis/projection/point_rule.h"
+#include "io/iges.h"
 #include "io/panel_file.h"
 #include "pipeline/addresses.h"
 
@@ -124,11 +126,18 @@ enum class FrameFormat { iges, vtu, obj, ply, stl, glb, json, csv };
 // The rows of history.csv.
 enum class HistoryRows { off, frames, steps };
 
+// A panel file as read_panels() gave it, and what was chosen of it.
+struct ReadFile {
+  PanelFile file;
+  PanelChoice choice;
+};
+
 // Complete, SI, every key consumed.
 struct Scene {
   std::string name;
   std::filesystem::path path;
-  std::vector<ScenePanel> panels;  // empty: all panels of `panel_file`
+  std::vector<ScenePanel> panels;        // empty: all panels of `panel_file`
+  std::shared_ptr<const ReadFile> read;  // a panel's file that has been read already; null: none
   std::vector<ScenePin> pins;
   std::vector<SceneTraction> tractions;
   std::vector<SceneSeam> seams;

@@ -125,14 +125,15 @@ class Arranger {
         TrimSpan span = of[loop.curves[c].reversed ? of.size() - 1 - k : k];
         if (span.degenerate()) continue;
         if (loop.curves[c].reversed) turn(span);
-        const int link = static_cast<int>(links.size());
-        links.push_back(span);
-        const std::size_t first = parts_.size();
         TrimSpan whole = span;
         for (std::size_t i = 0; i <= static_cast<std::size_t>(span.degree); ++i) {
           whole.u[i] *= scale_.x();
           whole.v[i] *= scale_.y();
         }
+        if (BezierPiece(whole).is_point()) continue;  // its ends differ by their last bit
+        const int link = static_cast<int>(links.size());
+        links.push_back(span);
+        const std::size_t first = parts_.size();
         split_forward(BezierPiece(whole), [&](const BezierPiece& piece) {
           parts_.push_back({l, link, -1, -1, piece});
         });

@@ -171,7 +171,7 @@ bool forward(const BezierPiece& piece) {
 }
 
 void split_forward(const BezierPiece& piece, const std::function<void(const BezierPiece&)>& each, int depth) {
-  if (depth == 30 || forward(piece)) return each(piece);
+  if (depth == 30 || piece.is_point() || forward(piece)) return each(piece);
   const auto [a, b] = split(piece, 0.5);
   split_forward(a, each, depth + 1);
   split_forward(b, each, depth + 1);

@@ -28,6 +28,7 @@ struct BezierPiece {
   Eigen::Vector2d at(double x) const { return span.at(x); }  // x in [0, 1] on the piece
   double size() const { return (box.max - box.min).maxCoeff(); }
   bool straight() const { return span.degree == 1; }
+  bool is_point() const { return box.min == box.max; }
   void set_box();
 };
 
@@ -39,7 +40,8 @@ std::pair<BezierPiece, BezierPiece> split(const BezierPiece& piece, double x);
 // No leg of the control polygon goes back along the chord: every line across it meets the piece at most once, so the
 // piece can't meet itself.
 bool forward(const BezierPiece& piece);
-// Calls `each` for the parts, in order, that halving needs to make all of them forward (cusps excepted).
+// Calls `each` for the parts, in order, that halving needs to make all of them forward (cusps and points
+// excepted).
 void split_forward(const BezierPiece& piece, const std::function<void(const BezierPiece&)>& each, int depth = 0);
 
 // The hulls lie apart by more than `margin` along the normal of a's chord.

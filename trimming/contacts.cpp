@@ -95,7 +95,7 @@ class Finder {
           span.u[i] *= scale_.x();
           span.v[i] *= scale_.y();
         }
-        chain.push_back(span);
+        if (!BezierPiece(span).is_point()) chain.push_back(span);
       }
     }
     std::vector<Piece> list;

@@ -3,10 +3,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <string>
+#include <utility>
 
 #include "analysis/projection/composed_rows.h"
 #include "geometry/error.h"
@@ -78,22 +77,28 @@ void check_places(const AffineMap& map, const std::vector<PlaceRow>& place) {
 
 void merge_near_points(const NurbsSurface& surface, std::vector<ConstraintPoint>& points, double distance) {
   const std::vector<double> u = surface.u().breaks(), v = surface.v().breaks();
-  std::map<std::array<int, 2>, std::vector<Eigen::Vector2d>> buckets;  // kept points by whole cell
+  // Kept points by whole cell: the last one that came, and before each the one that came before it.
+  const int along_u = static_cast<int>(u.size()), along_v = static_cast<int>(v.size());
+  std::vector<int> last(u.size() * v.size(), -1), before(points.size(), -1);
+  std::vector<Eigen::Vector2d> place(points.size());
+  const auto near_one_kept = [&](std::size_t k, int i, int j) {
+    for (int b = std::max(j - 1, 0); b <= std::min(j + 1, along_v - 1); ++b)
+      for (int a = std::max(i - 1, 0); a <= std::min(i + 1, along_u - 1); ++a)
+        for (int other = last[a + along_u * b]; other >= 0; other = before[other])
+          if ((place[k] - place[other]).norm() < distance) return true;
+    return false;
+  };
   for (bool vertices : {true, false})
-    for (ConstraintPoint& point : points) {
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      ConstraintPoint& point = points[k];
       if (!point.used || is_vertex(point) != vertices) continue;
-      const Eigen::Vector2d place(in_cells(u, point.u), in_cells(v, point.v));
-      const std::array<int, 2> cell{static_cast<int>(place[0]), static_cast<int>(place[1])};
-      bool near = false;
-      for (int a = cell[0] - 1; !near && a <= cell[0] + 1; ++a)
-        for (int b = cell[1] - 1; !near && b <= cell[1] + 1; ++b)
-          if (const auto bucket = buckets.find({a, b}); bucket != buckets.end())
-            for (const Eigen::Vector2d& other : bucket->second) near = near || (place - other).norm() < distance;
-      if (near) {
+      place[k] = {in_cells(u, point.u), in_cells(v, point.v)};
+      const int i = static_cast<int>(place[k][0]), j = static_cast<int>(place[k][1]);
+      if (near_one_kept(k, i, j)) {
         point.used = false;
         point.why = "merged";
       } else {
-        buckets[cell].push_back(place);
+        before[k] = std::exchange(last[i + along_u * j], static_cast<int>(k));
       }
     }
 }

@@ -159,10 +159,12 @@ FittedCurve to_curve(const OffsetCurve& offset, const Curve3& base, const Curve3
   if (!(domain.min <= range.min && range.min < range.max && range.max <= domain.max)) range = domain;
   const Curve3 part = range.min == domain.min && range.max == domain.max ? base : sub_curve(base, range);
   const std::vector<double> breaks = law.breaks();
+  const double one_place =
+      1e-12 * range.length();  // lengths were solved for: a break at a knot may miss it by rounding
   for (const int span : part.knots().spans()) {
     std::vector<double> stops{part.knots()[span]};
     for (const double b : breaks)
-      if (b > stops.front() && b < part.knots()[span + 1]) stops.push_back(b);
+      if (b > stops.back() + one_place && b < part.knots()[span + 1] - one_place) stops.push_back(b);
     stops.push_back(part.knots()[span + 1]);
     for (std::size_t k = 0; k + 1 < stops.size(); ++k) {
       const int law_span = law.span_at(0.5 * (stops[k] + stops[k + 1]));

@@ -4,11 +4,10 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "io/file.h"
 #include "pipeline/exit_code.h"
-#include "pipeline/json_text.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_argument.h"
 #include "pipeline/program/panel_choice.h"
@@ -23,11 +22,24 @@ struct Arguments {
   PanelChoice choice;
 };
 
+int report_refused(const std::vector<std::string>& refused, Console& console) {
+  for (const std::string& panel : refused) console.error(panel);
+  return refused.empty() ? exit_ok : exit_geometry;
+}
+
 int run(const Arguments& a, const Common& common, Console& console) {
   InspectOptions options = options_of(a.refinement);
   options.threads = common.threads;
   for (const std::string* target : {&a.svg, &a.png, &a.html}) require_free(*target, common.overwrite);
-  const Inspection inspection = inspect(read_panel_argument(a.input, a.choice), options);
+  PanelFile file = read_panel_argument(a.input, a.choice);
+  file.file.reset();  // the records, as large as the file
+  if (common.json && a.svg.empty() && a.png.empty() && a.html.empty()) {
+    const InspectionText text = inspect_to_json(std::move(file), options);
+    for (const std::string& piece : text.pieces) fmt::print("{}", piece);
+    fmt::print("\n");
+    return report_refused(text.refused, console);
+  }
+  const Inspection inspection = inspect(std::move(file), options);
   const auto draw = [&](const std::string& target, auto format) {
     if (target.empty()) return;
     write_file(target, format(inspection));
@@ -37,12 +49,11 @@ int run(const Arguments& a, const Common& common, Console& console) {
   draw(a.png, inspect_png);
   draw(a.html, inspect_html);
   if (common.json) {
-    fmt::print("{}\n", json_text(inspect_json(inspection, common.threads), 1));
+    fmt::print("{}\n", inspect_json_text(inspection));
   } else {
     fmt::print("{}", inspect_text(inspection, common.verbose));
   }
-  for (const std::string& panel : inspection.refused) console.error(panel);
-  return inspection.refused.empty() ? exit_ok : exit_geometry;
+  return report_refused(inspection.refused, console);
 }
 
 }  // namespace

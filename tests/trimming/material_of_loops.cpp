@@ -171,6 +171,21 @@ TEST(Material, PanelsOfLoopsOfUnknownKind) {
   EXPECT_EQ(panels({polygon_loop(box(0, 0, 1, 1)), polygon_loop(box(1, 0, 2, 1))}, false).panels.size(), 2u);
 }
 
+// Fits leave curves whose points differ by their last bit: in units of the tolerance they may be one point.
+TEST(Material, ACurveOfOneRoundingIsAPoint) {
+  for (int k = 1; k <= 100; ++k) {
+    const Vector2d corner(3 + 0.003 * k, 1.5 + 0.0013 * k);
+    const Vector2d beside(corner.x(), std::nextafter(corner.y(), 2 * corner.y()));
+    const TrimLoop outer = loop_of({line_segment<2>({0, corner.y()}, corner), bezier_curve({corner, beside, beside}),
+                                    line_segment<2>(beside, {corner.x(), 4}), line_segment<2>({corner.x(), 4}, {0, 4}),
+                                    line_segment<2>({0, 4}, {0, corner.y()})});
+    const Material material =
+        material_of({outer, backwards(polygon_loop(box(0, 2, 1, 3)))}, {true, {1 / 1.2e7, 1 / 1.2e7}});
+    ASSERT_EQ(material.panels.size(), 1u) << k;
+    EXPECT_EQ(material.panels[0].loops.size(), 1u) << k;
+  }
+}
+
 TEST(Material, AnEdgeRunOutAndBackIsASlit) {
   const Facts f = facts(with_holes(polygon_loop({{0, 0}, {4, 0}, {4, 2}, {2.5, 2}, {4, 2}, {4, 4}, {0, 4}}), {}));
   EXPECT_EQ(f.loops, 1u);
