@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "analysis/shell/shell_model.h"
@@ -97,7 +99,15 @@ TEST_P(ExtendedPanel, RowsSumToOneAndReferToIndependentControlPoints) {
   EXPECT_GT(c.extension.extended.size(), 0u);
   const Eigen::VectorXd sums = t * Eigen::VectorXd::Ones(t.cols());
   for (int i = 0; i < t.rows(); ++i) expect_near_rel(sums[i], 1, 1e-12);
-  EXPECT_NO_THROW(AffineMap(t, {}, nullptr));
+  for (int i = 0; i < t.rows(); ++i)
+    for (AffineMap::Matrix::InnerIterator e(t, i); e; ++e) {
+      if (e.value() == 0) continue;
+      const int k = static_cast<int>(e.col());
+      EXPECT_EQ(t.row(k).nonZeros(), 1) << i << " follows " << k;
+      EXPECT_EQ(t.coeff(k, k), 1) << i << " follows " << k;
+    }
+  const auto bare = std::ranges::count(c.extension.carries_cloth, false);
+  EXPECT_EQ(AffineMap(t, {}, nullptr).nodes(), t.rows() - bare - static_cast<int>(c.extension.extended.size()));
   for (int i : c.extension.extended) EXPECT_TRUE(c.extension.carries_cloth[i]);
 }
 
@@ -141,6 +151,16 @@ TEST(Extension, FlatRestStaysWhereItIs) {
   EXPECT_LT(c.extension.deviation, 1e-13);
 }
 
+TEST_P(ExtendedPanel, DeviationIsTheLargestMoveWithinTheMaterial) {
+  const auto [degree, rational, cut] = GetParam();
+  const NurbsSurface before = test::bumpy_surface(degree, 9, 8, rational);
+  const CutPanel c = make();
+  double largest = 0;
+  for (const Eigen::Vector2d& uv : c.panel.quadrature.points)
+    largest = std::max(largest, (c.extension.rest(uv.x(), uv.y()) - before(uv.x(), uv.y())).norm());
+  expect_near_rel(c.extension.deviation, largest, 1e-9, 1e-14);
+}
+
 TEST(Extension, KeepsFunctionsWhoseExtensionWouldMoveTheRestSurface) {
   const NurbsSurface surface = test::bumpy_surface(2, 9, 8, false);
   const CutPanel loose = cut_panel(surface, 0.3, {}, {.largest_deviation = 10});
@@ -167,26 +187,47 @@ TEST(Extension, ControlPointsWithoutClothStayNearARolledUpCloth) {
   EXPECT_GT((rolled - q).cwiseAbs().maxCoeff(), 0.1);  // they do follow the tangent plane, not the tube
 }
 
+// What counts is how far the surface moves where there is cloth, not how far a control point does.
+TEST(Extension, FunctionsThatHardlyReachTheClothAreExtendedHoweverFarTheirControlPointsMove) {
+  const NurbsSurface surface = test::bumpy_surface(2, 9, 8, false);
+  const CutPanel c = cut_panel(surface, 1e-9);
+  double moved = 0;
+  for (const int k : c.extension.extended)
+    moved = std::max(moved, (c.extension.rest.points().col(k) - surface.points().col(k)).norm());
+  EXPECT_GT(moved, 1e-3);  // of cells 1 / 9 wide
+  // The material ends 1e-9 of a cell behind u line 7 and v line 6, where functions 9 and 8 begin.
+  for (const int k : c.extension.kept) {
+    EXPECT_LT(k % surface.count_u(), 9);
+    EXPECT_LT(k / surface.count_u(), 8);
+  }
+}
+
 TEST(Extension, SlenderPartsFarFromAnyGoodCellKeepTheirFunctions) {
   const NurbsSurface flat = test::flat_surface(1, 1, uniform_knots(2, 12), uniform_knots(2, 12));
-  CutPanel c{test::make_panel(flat), {}};
-  // A block with a strap of a tenth of a cell along u.
-  CutQuadrature block = test::tensor_quadrature(flat, {Interval{0, 0.34}, Interval{0, 1}});
-  const CutQuadrature strap = test::tensor_quadrature(flat, {Interval{0.34, 1}, Interval{0.5, 0.5 + 0.1 / 12}});
-  for (CellRule cell : strap.cells) {
-    cell.first += static_cast<int>(block.points.size());
-    block.cells.push_back(cell);
+  for (const bool along_v : {false, true}) {
+    SCOPED_TRACE(along_v);
+    CutPanel c{test::make_panel(flat), {}};
+    // A block with a strap of a tenth of a cell along u, or along v.
+    const auto part = [&](const Interval& along, const Interval& across) {
+      return test::tensor_quadrature(flat, along_v ? std::array{across, along} : std::array{along, across});
+    };
+    CutQuadrature block = part({0, 0.34}, {0, 1});
+    const CutQuadrature strap = part({0.34, 1}, {0.5, 0.5 + 0.1 / 12});
+    for (CellRule cell : strap.cells) {
+      cell.first += static_cast<int>(block.points.size());
+      block.cells.push_back(cell);
+    }
+    block.points.insert(block.points.end(), strap.points.begin(), strap.points.end());
+    block.weights.insert(block.weights.end(), strap.weights.begin(), strap.weights.end());
+    c.panel.quadrature = block;
+    c.extension = extend(flat, block, ShellModel({c.panel}).lumped_mass());
+    EXPECT_GT(c.extension.kept.size(), 5u);
+    double largest = 0;
+    for (int k = 0; k < c.extension.dependence.outerSize(); ++k)
+      for (AffineMap::Matrix::InnerIterator e(c.extension.dependence, k); e; ++e)
+        largest = std::max(largest, std::abs(e.value()));
+    EXPECT_LT(largest, 65);  // (3, -8, 6) twice
   }
-  block.points.insert(block.points.end(), strap.points.begin(), strap.points.end());
-  block.weights.insert(block.weights.end(), strap.weights.begin(), strap.weights.end());
-  c.panel.quadrature = block;
-  c.extension = extend(flat, block, ShellModel({c.panel}).lumped_mass());
-  EXPECT_GT(c.extension.kept.size(), 5u);
-  double largest = 0;
-  for (int k = 0; k < c.extension.dependence.outerSize(); ++k)
-    for (AffineMap::Matrix::InnerIterator e(c.extension.dependence, k); e; ++e)
-      largest = std::max(largest, std::abs(e.value()));
-  EXPECT_LT(largest, 65);  // (3, -8, 6) twice
 }
 
 TEST(Extension, MassFloorRaisesOnlyLightNodes) {
@@ -199,6 +240,12 @@ TEST(Extension, MassFloorRaisesOnlyLightNodes) {
   EXPECT_EQ(floored.size(), 99);
   expect_near_rel(floored[54], 0.01 * 0.2 / 64, 1e-12);
   EXPECT_EQ(floored[53], 1.0);
+}
+
+TEST(Extension, MassFloorIsAShareOfAnElementsMass) {
+  const NurbsSurface flat = test::flat_surface(1, 0.5, uniform_knots(2, 8), uniform_knots(3, 4));
+  const Eigen::VectorXd floor = mass_floor(flat, 0.2);
+  for (const double mass : floor) expect_near_rel(mass, 0.01 * 0.2 * (1.0 / 8) * (0.5 / 4), 1e-12);
 }
 
 }  // namespace

@@ -317,6 +317,42 @@ TEST(FastProjection, AStepSolvesTheLimitLawAlongTheGradientsOfItsStart) {
       expect_near_rel(c.mass[k] * (x - candidate)[3 * k + a], impulse[3 * k + a], 1e-9, 1e-15);
 }
 
+// Which rows of a band pull is for the step to find: each multiplier has the sign of its strain, or is 0 where the
+// strain lies within the slack. Rows that pulled and that the candidate or other rows push back have to let go on the
+// way.
+TEST(FastProjection, RowsOfABandPullAtTheirEndsOnlyAndNeverPush) {
+  const FlatCloth c = flat_cloth(2, 8);
+  const StrainBand band{.stretch = 0.02, .compress = 0.01, .slack = 0.9};
+  for (const unsigned seed : {1u, 2u, 3u, 4u, 5u}) {
+    SCOPED_TRACE(seed);
+    FastProjection projection(free_map(c), c.mass, with_stiffness(c, 1e4),
+                              {.weft = band, .warp = band, .tolerance = 1e-6, .residual = 1e-8});
+    const auto& rows = projection.rows().strain;
+    ConstraintForces forces;
+    forces.strain.setZero(3, static_cast<Eigen::Index>(rows.size()));
+    int pull = 0, let_go = 0;
+    for (unsigned k = 0; k < 6; ++k) {
+      const double dt = k % 2 == 0 ? 1e-3 : 6e-4;
+      const Eigen::VectorXd before = forces.strain.row(0);
+      Eigen::VectorXd x = disturbed(c.rest, 5e-4 * (1 + k % 3), 10 * seed + k);
+      const ProjectionReport report = projection.step(x, dt, c.rest, dt, forces);
+      EXPECT_TRUE(report.converged);
+      const double allowed = 0.1 * band.compress;  // residual of a step that damps, of the narrower limit
+      for (std::size_t r = 0; r < rows.size(); ++r) {
+        const double lambda = projection.strain_multipliers()[static_cast<Eigen::Index>(r)];
+        const double C = strain(rows[r].row, x), end = band.slack * (C < 0 ? band.compress : band.stretch);
+        EXPECT_GE(lambda * C, 0) << r;
+        EXPECT_TRUE(lambda == 0 || std::abs(C) >= end - allowed) << r << ' ' << C;
+        EXPECT_TRUE(lambda != 0 || std::abs(C) <= end + allowed) << r << ' ' << C;
+        pull += lambda != 0;
+        let_go += lambda == 0 && before[static_cast<Eigen::Index>(r)] != 0;
+      }
+    }
+    EXPECT_GT(pull, 50);
+    EXPECT_GT(let_go, 30);
+  }
+}
+
 // Places of a cloth that starts flat, with velocities, under its strain limits alone.
 Eigen::VectorXd vibrate(const FlatCloth& c, double stiffness, const Eigen::VectorXd& velocity, double dt, int steps) {
   FastProjection projection(free_map(c), c.mass, with_stiffness(c, stiffness), {.residual = 1e-12});

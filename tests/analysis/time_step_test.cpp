@@ -74,8 +74,9 @@ void expect_step_near_limit(const Scene& s) {
   const TimeStepBound bound = time_step_bound(s.model, s.map, s.node_mass, s.q);
   const double limit = measured_limit(s, bound.dt);
   const double ratio = 0.9 * bound.dt / limit;
-  EXPECT_GE(ratio, 0.5);
-  EXPECT_LE(ratio, 0.95);
+  // The bound lies above the largest eigenvalue, by 2 % at most, of which a step loses half; the search ends at 0.15 %.
+  EXPECT_GE(ratio, 0.9 * 0.988);
+  EXPECT_LE(ratio, 0.9 * 1.002);
 }
 
 Eigen::VectorXd at_rest(const ShellModel& model) {
