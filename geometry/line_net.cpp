@@ -38,6 +38,53 @@ Rows elevate_bezier(const Rows& in) {
 
 }  // namespace
 
+std::vector<double> equal_weights(const std::vector<double>& weights, Eigen::Index count) {
+  return weights.empty() ? std::vector<double>()
+                         : std::vector<double>(static_cast<std::size_t>(count), weights.front());
+}
+
+LineNet to_net(const NurbsSurface& surface, Direction d) {
+  const int nu = surface.count_u(), nv = surface.count_v();
+  const int width = surface.rational() ? 4 : 3;
+  const bool along_u = d == Direction::u;
+  Rows rows(along_u ? nu : nv, width * (along_u ? nv : nu));
+  for (int j = 0; j < nv; ++j)
+    for (int i = 0; i < nu; ++i) {
+      const int k = surface.index(i, j);
+      auto entry = along_u ? rows.row(i).segment(width * j, width) : rows.row(j).segment(width * i, width);
+      entry.head<3>() = surface.points().col(k).transpose();
+      if (width == 4) {
+        entry *= surface.weight(k);
+        entry(3) = surface.weight(k);
+      }
+    }
+  return {surface.knots(d), std::move(rows)};
+}
+
+NurbsSurface to_surface(LineNet net, const NurbsSurface& like, Direction d) {
+  const bool along_u = d == Direction::u;
+  const int nu = along_u ? static_cast<int>(net.rows.rows()) : like.count_u();
+  const int nv = along_u ? like.count_v() : static_cast<int>(net.rows.rows());
+  const int width = like.rational() ? 4 : 3;
+  Eigen::Matrix3Xd points(3, nu * nv);
+  std::vector<double> weights =
+      like.rational() ? std::vector<double>(static_cast<std::size_t>(nu * nv)) : equal_weights(like.weights(), nu * nv);
+  for (int j = 0; j < nv; ++j)
+    for (int i = 0; i < nu; ++i) {
+      const auto entry =
+          along_u ? net.rows.row(i).segment(width * j, width) : net.rows.row(j).segment(width * i, width);
+      const int k = i + nu * j;
+      points.col(k) = entry.head<3>().transpose();
+      if (width == 4) {
+        weights[static_cast<std::size_t>(k)] = entry(3);
+        points.col(k) /= entry(3);
+      }
+    }
+  KnotVector u = along_u ? std::move(net.knots) : like.u();
+  KnotVector v = along_u ? like.v() : std::move(net.knots);
+  return {std::move(u), std::move(v), std::move(points), std::move(weights)};
+}
+
 LineNet insert_knots(LineNet net, std::span<const double> added) {
   if (added.empty()) return net;
   const int p = net.knots.degree();

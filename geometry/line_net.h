@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "geometry/knot_vector.h"
+#include "geometry/nurbs_surface.h"
 
 namespace toile::detail {
 
@@ -20,6 +21,14 @@ struct LineNet {
   KnotVector knots;
   Rows rows;
 };
+
+// Homogeneous coordinates where the surface is rational. Along u a row holds the points of one i for every j; along v
+// the other way round.
+LineNet to_net(const NurbsSurface& surface, Direction d);
+// The surface that `net` is in direction d; all else is as in `like`.
+NurbsSurface to_surface(LineNet net, const NurbsSurface& like, Direction d);
+// Equal weights are kept, so that a file's numbers come back.
+std::vector<double> equal_weights(const std::vector<double>& weights, Eigen::Index count);
 
 LineNet insert_knots(LineNet net, std::span<const double> added);
 

@@ -12,8 +12,11 @@
 namespace toile {
 namespace {
 
+using detail::equal_weights;
 using detail::LineNet;
 using detail::Rows;
+using detail::to_net;
+using detail::to_surface;
 
 // Homogeneous coordinates beside each other; polynomial geometry travels without its weight column.
 template <int Dim>
@@ -28,12 +31,6 @@ LineNet to_net(const NurbsCurve<Dim>& curve) {
   return {curve.knots(), std::move(rows)};
 }
 
-// Equal weights are kept, so that a file's numbers come back.
-std::vector<double> equal_weights(const std::vector<double>& weights, Eigen::Index count) {
-  return weights.empty() ? std::vector<double>()
-                         : std::vector<double>(static_cast<std::size_t>(count), weights.front());
-}
-
 template <int Dim>
 NurbsCurve<Dim> to_curve(LineNet net, const NurbsCurve<Dim>& like) {
   const Eigen::Index count = net.rows.rows();
@@ -45,49 +42,6 @@ NurbsCurve<Dim> to_curve(LineNet net, const NurbsCurve<Dim>& like) {
     points.col(i) /= net.rows(i, Dim);
   }
   return {std::move(net.knots), std::move(points), std::move(weights)};
-}
-
-// Along u a row holds the points of one i for every j; along v the other way round.
-LineNet to_net(const NurbsSurface& surface, Direction d) {
-  const int nu = surface.count_u(), nv = surface.count_v();
-  const int width = surface.rational() ? 4 : 3;
-  const bool along_u = d == Direction::u;
-  Rows rows(along_u ? nu : nv, width * (along_u ? nv : nu));
-  for (int j = 0; j < nv; ++j)
-    for (int i = 0; i < nu; ++i) {
-      const int k = surface.index(i, j);
-      auto entry = along_u ? rows.row(i).segment(width * j, width) : rows.row(j).segment(width * i, width);
-      entry.head<3>() = surface.points().col(k).transpose();
-      if (width == 4) {
-        entry *= surface.weight(k);
-        entry(3) = surface.weight(k);
-      }
-    }
-  return {surface.knots(d), std::move(rows)};
-}
-
-NurbsSurface to_surface(LineNet net, const NurbsSurface& like, Direction d) {
-  const bool along_u = d == Direction::u;
-  const int nu = along_u ? static_cast<int>(net.rows.rows()) : like.count_u();
-  const int nv = along_u ? like.count_v() : static_cast<int>(net.rows.rows());
-  const int width = like.rational() ? 4 : 3;
-  Eigen::Matrix3Xd points(3, nu * nv);
-  std::vector<double> weights =
-      like.rational() ? std::vector<double>(static_cast<std::size_t>(nu * nv)) : equal_weights(like.weights(), nu * nv);
-  for (int j = 0; j < nv; ++j)
-    for (int i = 0; i < nu; ++i) {
-      const auto entry =
-          along_u ? net.rows.row(i).segment(width * j, width) : net.rows.row(j).segment(width * i, width);
-      const int k = i + nu * j;
-      points.col(k) = entry.head<3>().transpose();
-      if (width == 4) {
-        weights[static_cast<std::size_t>(k)] = entry(3);
-        points.col(k) /= entry(3);
-      }
-    }
-  KnotVector u = along_u ? std::move(net.knots) : like.u();
-  KnotVector v = along_u ? like.v() : std::move(net.knots);
-  return {std::move(u), std::move(v), std::move(points), std::move(weights)};
 }
 
 // A bound on the distance between two splines on the same knots, whose row groups hold `width` homogeneous coordinates

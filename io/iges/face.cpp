@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "geometry/error.h"
+#include "io/iges/continuation.h"
 #include "io/iges/entity.h"
 #include "io/iges/loop_curves.h"
 #include "io/iges/parameter_reading.h"
@@ -108,7 +110,13 @@ class FaceMaker {
 
 std::vector<TrimmedSurface> make_faces(const FileSurface& surface, std::vector<BoundaryCurves>& boundaries,
                                        const FaceOptions& options) {
-  return FaceMaker(surface, boundaries, options).run();
+  double by = 0;
+  const std::optional<FileSurface> wider = continued_surface(surface, boundaries, options, by);
+  if (!wider) return FaceMaker(surface, boundaries, options).run();
+  options.note("continued surface", boundaries[0].place + "it goes " + format_real(by) +
+                                        " of the domain beyond the surface, which is "
+                                        "continued");
+  return FaceMaker(*wider, boundaries, options).run();
 }
 
 Eigen::AlignedBox3d reach(const Frame& frame, const std::vector<BoundaryCurves>& boundaries) {
