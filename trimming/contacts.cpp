@@ -282,11 +282,20 @@ class Finder {
     if (kind != ContactKind::touch) overlapped_ = true;
   }
 
+  // Next to the joint where the span of b follows that of a: two spans that leave it in one direction, up to rounding,
+  // may meet again this near to it.
+  bool cusp(const Piece& a, const Piece& b, const Vector2d& uv) const {
+    const std::size_t n = chain(a).size(), link = static_cast<std::size_t>(a.link);
+    return a.loop == b.loop && n > 2 && (link + 1) % n == static_cast<std::size_t>(b.link) &&
+           (uv - chain(a)[link].last()).cwiseAbs().maxCoeff() <= cluster_;
+  }
+
   // Crossing, touch or overlap: by the order in which the four branches leave the contact.
   void add_contact(const Piece& a, const Piece& b, const Vector2d& uv) {
     for (const Vector2d& known : places_) {
       if ((known - uv).cwiseAbs().maxCoeff() <= cluster_) return;
     }
+    if (cusp(a, b, uv) || cusp(b, a, uv)) return;
     const TrimSpan& span_a = chain(a)[static_cast<std::size_t>(a.link)];
     const TrimSpan& span_b = chain(b)[static_cast<std::size_t>(b.link)];
     const double size = std::min((span_a.last() - span_a.first()).norm(), (span_b.last() - span_b.first()).norm());

@@ -38,6 +38,10 @@ class Closer {
         snap(loop);
       }
       close(loop);
+      if (!fit) continue;
+      // A control point that moved may have taken its curve out again, where that touches the border.
+      move_into_domain(loop);
+      close(loop);
     }
     return std::move(repairs_);
   }
@@ -122,6 +126,8 @@ class Closer {
     const std::size_t a = axis == Axis::u ? 0 : 1;
     const double line = beyond_max ? lines_[a].back() : lines_[a].front();
     const int beyond = beyond_max ? 1 : -1;
+    const double unit =
+        std::numeric_limits<double>::epsilon() * std::max(std::abs(lines_[a].front()), std::abs(lines_[a].back()));
     std::pair<double, Vector2d> worst{0, {0, 0}};
     for (const TrimSpan& span : trim_spans(c.curve)) {
       const LineForm form(span, axis, line);
@@ -134,7 +140,8 @@ class Closer {
       for (int k = 0; k <= 64; ++k) {
         const Vector2d x = span.at(k / 64.0);
         const double out = beyond * (x[static_cast<Eigen::Index>(a)] - line);
-        if (out >= worst.first) worst = {std::max(out, std::numeric_limits<double>::min()), x};
+        // What no double of this size can show is still an excursion.
+        if (out >= worst.first) worst = {std::max(out, unit), x};
       }
     }
     return worst;
@@ -164,7 +171,7 @@ class Closer {
             if (loop.kind == LoopKind::hole) continue;  // cut off where it crosses the outer loop, or refused there
             fail(loop, &c, "the trim leaves the domain by " + text(out) + ", may by " + text(reach(place, a)), place);
           }
-          const double moved = pull_in(c, axis, beyond_max, out);
+          const double moved = pull_in(c, axis, beyond_max, out, place);
           if (moved == 0) fail(loop, &c, "the trim leaves the domain by " + text(out), place);
           report(loop, "moved curve " + std::to_string(c.index) + " into the domain", moved, place);
         }
@@ -175,8 +182,8 @@ class Closer {
   // Moves a curve that leaves the domain by `out` into it, and says how far its control points moved; 0 where that
   // fails. Ends that stick out move onto the border, and so do all points where they stick out no further than the
   // curve does: what runs along the border stays straight. Else the points of the spans that leave move back by a
-  // little more than the curve has to.
-  double pull_in(TrimCurve& c, Axis axis, bool beyond_max, double out) {
+  // little more than the curve has to. `place` is where it leaves the most.
+  double pull_in(TrimCurve& c, Axis axis, bool beyond_max, double out, const Vector2d& place) {
     const Eigen::Index a = axis == Axis::u ? 0 : 1, last = c.curve.points().cols() - 1;
     const std::vector<double>& lines = lines_[static_cast<std::size_t>(a)];
     const double line = beyond_max ? lines.back() : lines.front(), inwards = beyond_max ? -1 : 1;
@@ -185,17 +192,25 @@ class Closer {
     Curve2::Points points = given.points();
     double hull = 0;
     for (Eigen::Index i = 0; i <= last; ++i) hull = std::max(hull, beyond(points(a, i)));
+    const bool all = hull <= std::max(4 * out, rounding * (lines.back() - lines.front()));
     for (Eigen::Index i = 0; i <= last; ++i)
-      if (const double x = beyond(points(a, i)); x > 0 && (i == 0 || i == last || hull <= 4 * out)) points(a, i) = line;
+      if (beyond(points(a, i)) > 0 && (all || i == 0 || i == last)) points(a, i) = line;
     set_points(c, points);
     double by = 2 * out;
     for (int attempt = 0; attempt < 8 && excursion(c, axis, beyond_max).first > 0; ++attempt, by *= 2) {
       for (Eigen::Index i = 1; i < last; ++i)
         if (beyond(points(a, i)) > -by) c.curve = moved(c.curve, i, a, inwards * by);
     }
+    // Where that isn't enough, the whole net moves in, if it sticks out no further than the curve may.
     if (excursion(c, axis, beyond_max).first > 0) {
-      c.curve = given;
-      return 0;
+      points = given.points();
+      if (hull > reach(place, a)) {
+        c.curve = given;
+        return 0;
+      }
+      for (Eigen::Index i = 0; i <= last; ++i)
+        if (beyond(points(a, i)) > 0) points(a, i) = line;
+      set_points(c, points);
     }
     return (c.curve.points().row(a) - given.points().row(a)).cwiseAbs().maxCoeff();
   }

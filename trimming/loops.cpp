@@ -74,10 +74,16 @@ class Validator {
                                                    : "touches") +
            other;
   }
+  // How near two parts are that can't be told apart, and what would have to be finer.
+  std::string gap_text(const LoopContact& contact) const {
+    if (contact.kind != ContactKind::overlap) return "";
+    const Vector2d least = meeting_tolerance(surface_);
+    return ", less than " + text(least.minCoeff()) + " apart; the file's resolution is " + text(surface_.resolution);
+  }
   [[noreturn]] void fail(const LoopContact& contact, const std::string& why) const {
     const TrimLoop& a = surface_.loops[static_cast<std::size_t>(contact.loop_a)];
     throw GeometryError(place_name(surface_, a, &a.curves[static_cast<std::size_t>(contact.curve_a)]) + ": " +
-                        contact_text(contact) + " at " + point_text(contact.uv) + why);
+                        contact_text(contact) + " at " + point_text(contact.uv) + gap_text(contact) + why);
   }
 
   // Loops that cross or run along each other become loops that do neither.

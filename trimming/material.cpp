@@ -120,12 +120,15 @@ class Resolver {
       if (!o.first && outer_ == 0) outer_ = l;  // it holds the loop that is called the outer one
     }
     std::vector<int> outside;
-    for (const int l : members_) {
-      if (l == outer_) continue;
-      beside_[index(l)] = !overlap(outer_, l).both;
-      if (beside_[index(l)]) outside.push_back(l);
-    }
+    for (const int l : members_)
+      if (l != outer_ && !overlap(outer_, l).both) outside.push_back(l);
     nest(outside);
+    // A loop that lies beside the outer one is a second outer loop where it is around others, else it takes nothing
+    // away.
+    for (const int l : outside) {
+      beside_[index(l)] = std::ranges::any_of(outside, [&](int m) { return m != l && overlap(l, m).both.has_value(); });
+      if (!beside_[index(l)]) out_.idle.push_back(l);
+    }
   }
 
   // Loops of which none is known to be a hole lie within or beside each other.
@@ -408,7 +411,7 @@ class Resolver {
       });
       if (shared == chain.end()) continue;
       const int e = shared->edge;
-      if (bounds_nothing(e, l)) continue;  // said with the slit
+      if (bounds_nothing(e, l) || std::ranges::find(out_.idle, l) != out_.idle.end()) continue;  // said elsewhere
       const bool hole = known_ && l != (outer_ == nothing ? members_.front() : outer_);
       if (known_ && outer_ != nothing && l == outer_) continue;  // said with the hole
       out_.changes.push_back({loops_[index(l)].index,
@@ -431,7 +434,8 @@ class Resolver {
 };
 
 // Panels of simple loops that don't cross: a loop within an odd number of others is a hole.
-void group(std::vector<TrimLoop>& loops, const std::vector<int>& source, Material& out) {
+// Where one of them is known to be the outer loop, one of the given loops that lies beside it bounds nothing.
+void group(std::vector<TrimLoop>& loops, const std::vector<int>& source, bool outer_known, Material& out) {
   const TrimSpans spans = trim_spans(loops);
   PredicateCounts counts;
   const int n = static_cast<int>(loops.size());
@@ -446,8 +450,17 @@ void group(std::vector<TrimLoop>& loops, const std::vector<int>& source, Materia
     p.loops.back().kind = kind;
     p.source.push_back(source[static_cast<std::size_t>(l)]);
   };
+  const auto idle = [&](int l) {
+    return outer_known && source[static_cast<std::size_t>(l)] > 0 && around[static_cast<std::size_t>(l)].empty() &&
+           std::ranges::none_of(
+               around, [&](const std::vector<int>& others) { return std::ranges::find(others, l) != others.end(); });
+  };
   for (int l = 0; l < n; ++l) {
     if (around[static_cast<std::size_t>(l)].size() % 2 != 0) continue;
+    if (idle(l)) {
+      out.idle.push_back(source[static_cast<std::size_t>(l)]);
+      continue;
+    }
     panel[static_cast<std::size_t>(l)] = static_cast<int>(out.panels.size());
     out.panels.emplace_back();
     add(l, out.panels.size() - 1, LoopKind::outer);
@@ -467,6 +480,20 @@ bool holds(const Material::Panel& panel, const TrimSpans& spans, const Vector2d&
     if ((winding_number(panel.loops, spans, static_cast<int>(l), uv, counts).value_or(0) != 0) != (l == 0))
       return false;
   return true;
+}
+
+// A loop may be given several times, a period apart: one that counts is enough.
+void report_idle(const std::vector<TrimLoop>& loops, Material& out) {
+  std::set<int> counts;
+  for (int l = 0; l < static_cast<int>(loops.size()); ++l)
+    if (std::ranges::find(out.idle, l) == out.idle.end()) counts.insert(loops[static_cast<std::size_t>(l)].index);
+  for (const int l : out.idle) {
+    const TrimLoop& loop = loops[static_cast<std::size_t>(l)];
+    if (!counts.insert(loop.index).second) continue;
+    const TrimCurve& c = loop.curves.front();
+    out.changes.push_back({loop.index, "lies beside the outer loop, where it takes nothing away; it is left out", 0,
+                           c.reversed ? c.curve.end() : c.curve.start()});
+  }
 }
 
 void add_slits(std::vector<Resolver::Slit>& slits, const std::vector<TrimLoop>& loops, Material& out) {
@@ -515,7 +542,8 @@ Material material_of(const std::vector<TrimLoop>& loops, const MaterialOptions& 
       std::ranges::move(resolver.slits, std::back_inserter(slits));
     }
   }
-  group(simple, source, out);
+  group(simple, source, options.outer_known, out);
+  report_idle(loops, out);
   if (out.panels.empty()) throw GeometryError("the loops leave no material");
   add_slits(slits, loops, out);
   return out;

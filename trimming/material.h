@@ -11,8 +11,9 @@
 namespace toile {
 
 struct MaterialOptions {
-  // Loop 0 is the outer one and the others are holes, taken away from it wherever they lie. Else loops within loops are
-  // holes and islands in turn, and loops that cross each other are refused.
+  // Loop 0 is the outer one and the others are holes, taken away from it wherever they lie. A loop beside it takes
+  // nothing away and is left out, but where others lie within it: that one is a second outer loop. Else loops within
+  // loops are holes and islands in turn, and loops that cross each other are refused.
   bool outer_known = true;
   Eigen::Vector2d tolerance{1e-10, 1e-10};  // places nearer than this count as one (arrangement.h)
 };
@@ -30,6 +31,7 @@ struct Material {
     std::vector<PanelMark> marks;
   };
   std::vector<Panel> panels;
+  std::vector<int> idle;  // positions of loops that lie beside the outer one
   std::vector<LoopRepair> changes;
 };
 

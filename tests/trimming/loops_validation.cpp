@@ -153,6 +153,41 @@ TEST(LoopValidation, MovesSmallExcursionsIntoTheDomain) {
   EXPECT_TRUE(validate_loops(hull).empty());
 }
 
+// A line runs into an arc that turns back along it, as fillets do in files of nine digits: within rounding the two meet
+// again next to their joint.
+TEST(LoopValidation, ACuspOfRoundedNumbersIsNoCrossing) {
+  int accepted = 0;
+  for (const double off : {-3e-10, -1e-10, 0.0, 1e-10, 3e-10}) {
+    TrimmedSurface face = with_outline(
+        loop_of({line_segment<2>({1, 1}, {3, 1.5}), bezier_curve({{3, 1.5}, {2.75, 1.4375 + off}, {2.5, 1.7}}),
+                 line_segment<2>({2.5, 1.7}, {2, 3}), line_segment<2>({2, 3}, {1, 1})}));
+    validate_loops(face);
+    expect_laws(face, trace_trims(face));
+    ++accepted;
+  }
+  EXPECT_EQ(accepted, 5);
+}
+
+// Leaves by 3e-28 near its start: no double between two samples shows it.
+TEST(LoopValidation, MovesAnExcursionIntoTheDomainThatNoSampleShows) {
+  TrimmedSurface face =
+      with_outline(loop_of({bezier_curve({{1, 0}, {2, -1e-14}, {2.5, 2}, {3, 0}}), line_segment<2>({3, 0}, {3, 4}),
+                            line_segment<2>({3, 4}, {1, 4}), line_segment<2>({1, 4}, {1, 0})}));
+  EXPECT_TRUE(reports(validate_loops(face), "into the domain"));
+  expect_laws(face, trace_trims(face));
+}
+
+// The curve touches v = 0 from within while its net goes beyond; what snaps its ends to v = 0 takes it out.
+TEST(LoopValidation, WhatSnapsStaysInTheDomain) {
+  const double d = 5e-7, e = 2e-6, g = (d + 4 * e) / 3;
+  TrimmedSurface face = with_outline(
+      loop_of({bezier_curve({{1, d}, {1.5, e}, {2, -g}, {2.5, e}, {3, d}}), line_segment<2>({3, d}, {3, 4}),
+               line_segment<2>({3, 4}, {1, 4}), line_segment<2>({1, 4}, {1, d})}));
+  face.resolution = 1e-6;
+  EXPECT_TRUE(reports(validate_loops(face), "snapped curve 0 to v = 0"));
+  expect_laws(face, trace_trims(face));
+}
+
 TEST(LoopValidation, SnapsToKnotLinesWithinTheResolution) {
   TrimmedSurface face = with_outline(polygon_loop({{1 + 1e-9, 1}, {3, 1 - 1e-9}, {3, 3}, {1, 3}}));
   face.resolution = 1e-8;

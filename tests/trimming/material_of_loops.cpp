@@ -148,6 +148,8 @@ TEST(Material, TheHoleMayBeAroundTheOuterLoop) {
 TEST(Material, RefusesWhereNothingIsLeftOrTheHolePartsThePanel) {
   EXPECT_NE(refusal(with_holes(polygon_loop(box(1, 1, 3, 3)), {polygon_loop(box(1, 1, 3, 3))})).find("nothing is left"),
             std::string::npos);
+  const std::string again = refusal(with_holes(polygon_loop(box(1, 1, 3, 3)), {polygon_loop(box(1, 1, 3, 3))}));
+  EXPECT_NE(again.find("less than 4e-10 apart; the file's resolution is"), std::string::npos) << again;
   const std::string parted = refusal(with_holes(polygon_loop(box(0, 1, 4, 3)), {polygon_loop(box(1, 0, 2, 4))}));
   EXPECT_NE(parted.find("2 pieces"), std::string::npos) << parted;
   EXPECT_NE(parted.find("(u, v) = (1, "), std::string::npos) << parted;
@@ -184,6 +186,26 @@ TEST(Material, ACurveOfOneRoundingIsAPoint) {
     ASSERT_EQ(material.panels.size(), 1u) << k;
     EXPECT_EQ(material.panels[0].loops.size(), 1u) << k;
   }
+}
+
+TEST(Material, AHoleBesideTheOuterLoopIsLeftOut) {
+  for (const double x : {1.5, 1.0}) {  // apart, and sharing an edge
+    SCOPED_TRACE(x);
+    std::vector<TrimLoop> loops{polygon_loop(box(0, 0, 1, 1)), polygon_loop(box(x, 0, x + 1, 1))};
+    loops[1].index = 1;
+    const Material m = material_of(loops, {true, {1e-10, 1e-10}});
+    ASSERT_EQ(m.panels.size(), 1u);
+    EXPECT_EQ(m.idle, std::vector<int>{1});
+    ASSERT_EQ(m.changes.size(), 1u);
+    EXPECT_NE(m.changes[0].what.find("left out"), std::string::npos);
+    EXPECT_EQ(m.changes[0].place, Vector2d(x, 0));
+  }
+  // Around a loop of its own it is another outer loop.
+  const Material two =
+      material_of({polygon_loop(box(0, 0, 1, 1)), polygon_loop(box(1.5, 0, 3.5, 2)), polygon_loop(box(2, 1, 3, 1.5))},
+                  {true, {1e-10, 1e-10}});
+  EXPECT_EQ(two.panels.size(), 2u);
+  EXPECT_TRUE(two.idle.empty());
 }
 
 TEST(Material, AnEdgeRunOutAndBackIsASlit) {
