@@ -91,6 +91,13 @@ BoundaryCurves plane_boundary(Reading& reading, const Entry& plane, const Entry&
   return out;
 }
 
+// The curve that a plane 108 names as its border, or 0. In form -1 it bounds a hole.
+int border_of_plane(Reading& reading, const Entry& surface) {
+  if (surface.type != 108 || surface.form < 0) return 0;
+  Parameters in(reading.file, surface, &reading.notes);
+  return read_plane(in).boundary;
+}
+
 std::vector<std::array<Eigen::Vector3d, 2>> ends_of(const std::vector<Curve3>& curves) {
   std::vector<std::array<Eigen::Vector3d, 2>> out;
   for (const Curve3& c : curves) out.push_back({c.start(), c.end()});
@@ -169,6 +176,16 @@ std::vector<TrimmedSurface> panels_of(Reading& reading, const Entry& e) {
     entries.push_back(&from);
   }
   const Entry& carrier = reading.entry(record.surface, e, "surface");
+  // A plane may name the curve that bounds it: the border of the surface, where the face has none of its own.
+  if (const int own = record.bounded_by_domain ? border_of_plane(reading, carrier) : 0; own != 0) {
+    const Entry& from = reading.entry(own, carrier, "boundary");
+    BoundaryCurves border = plane_boundary(reading, carrier, from);
+    border.record = entries.size();
+    boundaries.insert(boundaries.begin(), std::move(border));
+    entries.push_back(&from);
+    record.bounded_by_domain = false;
+    record.has_outer = true;
+  }
   if (record.bounded_by_domain && has_no_end(carrier))
     throw InputError(reading.file.place(e) + "it names no outer boundary, and its surface (entity " +
                      std::to_string(carrier.type) + ") has no border of its own");

@@ -20,6 +20,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double believable = 1e-2;  // of the surface's size: model curves further off it bound something else
+constexpr double bridgeable = 1e-2;  // of the domain: wider gaps are refused
+constexpr double corner = 0.01;      // tangent of the angle by which a curve turns at once
 constexpr const char* out_of_order =
     "its curves don't follow each other in the file's order; they are sorted by their ends";
 
@@ -56,11 +58,43 @@ std::vector<std::size_t> order_by_ends(const std::vector<std::array<Point, 2>>& 
   return order;
 }
 
+// A curve cut where it turns a corner: one curve may run all around a face.
+std::vector<Curve3> smooth_pieces(const Curve3& c) {
+  std::vector<double> corners;
+  const int p = c.degree();
+  for (int i = p + 1; i + p <= c.knots().control_point_count(); ++i) {
+    if (c.knots()[i] != c.knots()[i + p - 1] || c.knots()[i] == c.domain().min || c.knots()[i] >= c.domain().max)
+      continue;
+    const Vector3d before = c.points().col(i - 1) - c.points().col(i - 2),
+                   after = c.points().col(i) - c.points().col(i - 1);
+    if (!corners.empty() && corners.back() == c.knots()[i]) continue;
+    if (before.dot(after) <= 0 || before.cross(after).norm() > corner * before.dot(after))
+      corners.push_back(c.knots()[i]);
+  }
+  if (p < 2 || corners.empty()) return {c};
+  std::vector<Curve3> out;
+  double from = c.domain().min;
+  for (const double to : corners) {
+    out.push_back(sub_curve(c, {from, to}));
+    from = to;
+  }
+  out.push_back(sub_curve(c, {from, c.domain().max}));
+  return out;
+}
+
 class LoopCurves {
  public:
   LoopCurves(const FacePlane& plane, const ParameterMap& map) : plane_(plane), map_(map) {}
 
   std::vector<TrimCurve> run(BoundaryCurves& b) const {
+    std::vector<TrimCurve> out = best_of(b);
+    bridge_gaps(out, b);
+    return out;
+  }
+
+ private:
+  // The parameter curves, or what the model curves draw where those are better.
+  std::vector<TrimCurve> best_of(BoundaryCurves& b) const {
     std::string trouble;
     std::vector<TrimCurve> own;
     double off = 0;
@@ -122,9 +156,9 @@ class LoopCurves {
     return own;
   }
 
- private:
   // Each curve's direction, and its period where the surface is closed, so that it begins where the one before it ends.
-  // Ends that meet as they stand go before ends that meet a period apart.
+  // Ends that meet as they stand go before ends that meet a period apart. Where ends don't meet at all, as at a pole
+  // whose side the file leaves out, the later curves keep the period in which the loop closes.
   void chain(std::vector<TrimCurve>& curves) const {
     const auto gap = [&](const Vector2d& a, const Vector2d& b, bool across) {
       Vector2d d = b - a;
@@ -149,14 +183,39 @@ class LoopCurves {
         return std::min(gap(last(c), first(curves[1]), across), gap(last(c), last(curves[1]), across));
       });
     }
+    std::size_t broken = n;  // the last curve whose start doesn't meet what precedes it
+    Vector2d periods{0, 0};  // by which the latest curve has been shifted
     for (std::size_t i = 1; i < n; ++i) {
       const Vector2d x = last(curves[i - 1]);
       turn_to_meet(curves[i], [&](const TrimCurve& c, bool across) { return gap(x, first(c), across); });
-      const Vector2d d = x - first(curves[i]);
-      for (int k = 0; k < 2; ++k)
-        if (const double period = plane_.period[static_cast<std::size_t>(k)]; period > 0)
-          shift(curves[i], k, period * std::round(d[k] / period));
+      const Vector2d from = first(curves[i]);
+      if (gap(x, from, true) > usable || along_pole(x, from + periods))
+        broken = i;
+      else
+        periods = whole_periods(x - from);
+      shift_by(curves[i], periods);
     }
+    const Vector2d tail = last(curves.back()), head = first(curves.front());
+    if (broken == n || along_pole(tail, head)) return;
+    for (std::size_t i = broken; i < n; ++i) shift_by(curves[i], -whole_periods(tail - head));
+  }
+
+  // Whether a jump is the side of the surface that is one point in space, from end to end or in part.
+  bool along_pole(const Vector2d& a, const Vector2d& b) const {
+    const Vector2d jump = (b - a).cwiseQuotient(Vector2d(plane_.domain[0].length(), plane_.domain[1].length()));
+    return jump.norm() > usable && std::min(std::abs(jump.x()), std::abs(jump.y())) <= usable && collapsed(a, b);
+  }
+
+  // The whole periods nearest to a way.
+  Vector2d whole_periods(const Vector2d& way) const {
+    Vector2d out{0, 0};
+    for (int k = 0; k < 2; ++k)
+      if (const double period = plane_.period[static_cast<std::size_t>(k)]; period > 0)
+        out[k] = period * std::round(way[k] / period);
+    return out;
+  }
+  static void shift_by(TrimCurve& c, const Vector2d& way) {
+    for (int k = 0; k < 2; ++k) shift(c, k, way[k]);
   }
 
   // Whether the straight way between two places of the parameter plane is one point in space.
@@ -172,10 +231,24 @@ class LoopCurves {
   void bridge_poles(std::vector<TrimCurve>& curves) const {
     for (std::size_t i = 0; i < curves.size(); ++i) {
       const Vector2d a = last(curves[i]), b = first(curves[(i + 1) % curves.size()]);
-      const Vector2d jump = (b - a).cwiseQuotient(Vector2d(plane_.domain[0].length(), plane_.domain[1].length()));
-      if (jump.norm() <= usable || std::min(std::abs(jump.x()), std::abs(jump.y())) > usable || !collapsed(a, b))
-        continue;
+      if (!along_pole(a, b)) continue;
       curves.insert(curves.begin() + static_cast<std::ptrdiff_t>(++i), leg(a, b, static_cast<int>(curves.size())));
+    }
+  }
+
+  // Gaps too wide to be closed by moving ends, and narrow beside the surface: a straight piece.
+  void bridge_gaps(std::vector<TrimCurve>& curves, BoundaryCurves& b) const {
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+      const Vector2d from = last(curves[i]), to = first(curves[(i + 1) % curves.size()]);
+      const double jump =
+          (to - from).cwiseQuotient(Vector2d(plane_.domain[0].length(), plane_.domain[1].length())).norm();
+      if (jump <= usable || jump > bridgeable) continue;
+      plane_.note(b, "gap",
+                  "a gap of " + format_real(jump) + " of the domain, " +
+                      format_real((point_at(plane_, to) - point_at(plane_, from)).norm()) + " in space, after curve " +
+                      std::to_string(curves[i].index) + " is closed by a straight piece");
+      b.converted = "a gap closed by a straight piece";
+      curves.insert(curves.begin() + static_cast<std::ptrdiff_t>(++i), leg(from, to, static_cast<int>(curves.size())));
     }
   }
 
@@ -324,12 +397,19 @@ class LoopCurves {
 
   Pulled pulled(const BoundaryCurves& boundary, std::optional<Vector2d> start) const {
     Pulled out;
-    std::vector<Curve3> model = boundary.model;
+    std::vector<Curve3> pieces;
+    std::vector<int> number;
+    for (const Curve3& m : boundary.model)
+      for (Curve3& piece : smooth_pieces(m)) {
+        pieces.push_back(std::move(piece));
+        number.push_back(static_cast<int>(&m - boundary.model.data()));
+      }
+    std::vector<Curve3> model = pieces;
     std::vector<std::array<Vector3d, 2>> ends;
     for (const Curve3& m : model) ends.push_back({m.start(), m.end()});
     const std::vector<std::size_t> order =
         follow_each_other(ends) ? std::vector<std::size_t>{} : order_by_ends(ends, usable * plane_.size);
-    for (std::size_t i = 0; i < order.size(); ++i) model[i] = boundary.model[order[i]];
+    for (std::size_t i = 0; i < order.size(); ++i) model[i] = pieces[order[i]];
     chain(model);
     const std::optional<AffinePatch> patch =
         plane_.file.plane ? std::nullopt : affine_patch(plane_.surface, 1e-9 * plane_.size);
@@ -369,7 +449,7 @@ class LoopCurves {
     }
     out.curves = numbered(std::move(flat));
     for (std::size_t i = 0; i < model.size(); ++i) out.curves[i].model = model[i];
-    for (std::size_t i = 0; i < order.size(); ++i) out.curves[i].index = static_cast<int>(order[i]);
+    for (std::size_t i = 0; i < model.size(); ++i) out.curves[i].index = number[order.empty() ? i : order[i]];
     out.sorted = !order.empty();
     chain(out.curves);
     bridge_poles(out.curves);

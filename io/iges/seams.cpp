@@ -38,7 +38,7 @@ std::optional<double> pole(const FacePlane& plane, std::size_t k, bool forward) 
     for (int i = 0; i <= 4; ++i) {
       const double along = plane.domain[k].min + plane.domain[k].length() * i / 5;
       const Vector3d x = k == 0 ? plane.surface(along, line) : plane.surface(line, along);
-      if (i > 0 && (x - before).norm() > 1e-9 * plane.size) collapsed[side] = false;
+      if (i > 0 && (x - before).norm() > 1e-6 * plane.size) collapsed[side] = false;
       before = x;
     }
   }

@@ -242,6 +242,46 @@ TEST(IgesFaces, LoopsReachIntoACollapsedEdge) {
   expect_near_rel(found[1], whole, 1e-6);
 }
 
+// A plane whose holes alone are given: nothing says where it ends.
+TEST(IgesFaces, ASurfaceWithoutEndNeedsAnOuterBoundary) {
+  const std::string plane = test::with_entities(
+      test::corpus_text("natural_144"),
+      {"108,0.,0.,1.,5.,0,0.,0.,0.,0.;", "110,1.,1.,5.,2.,1.,5.;", "110,2.,1.,5.,1.,2.,5.;", "110,1.,2.,5.,1.,1.,5.;"});
+  const auto last = 2 * static_cast<int>(read_corpus("natural_144").ledger.size()) - 1;
+  const auto number = [&](int k) { return std::to_string(last + 2 * k); };
+  const std::string with_face = test::with_entities(
+      plane, {"102,3," + number(2) + "," + number(3) + "," + number(4) + ";",
+              "142,0," + number(1) + ",0," + number(5) + ",2;", "144," + number(1) + ",1,1,0," + number(6) + ";"});
+  const PanelFile file = parse_iges(with_face, "plane.igs");
+  EXPECT_EQ(file.panels.size(), read_corpus("natural_144").panels.size());
+  EXPECT_TRUE(has_warning(file, "has no border of its own")) << testing::PrintToString(file.warnings);
+}
+
+// But a plane may name its own border.
+TEST(IgesFaces, APlanesOwnBorderBoundsAFaceThatNamesNone) {
+  const auto last = 2 * static_cast<int>(read_corpus("natural_144").ledger.size()) - 1;
+  const auto number = [&](int k) { return std::to_string(last + 2 * k); };
+  const std::string text = test::with_entities(
+      test::corpus_text("natural_144"),
+      {"100,5.,1.5,1.5,11.5,1.5,11.5,1.5;", "108,0.,0.,1.,5.," + number(1) + ",0.,0.,0.,0.;", "110,1.,1.,5.,2.,1.,5.;",
+       "110,2.,1.,5.,1.,2.,5.;", "110,1.,2.,5.,1.,1.,5.;",
+       "102,3," + number(3) + "," + number(4) + "," + number(5) + ";", "142,0," + number(2) + ",0," + number(6) + ",2;",
+       "144," + number(2) + ",1,1,0," + number(7) + ";"});
+  const PanelFile file = parse_iges(text, "plane.igs");
+  ASSERT_EQ(file.panels.size(), read_corpus("natural_144").panels.size() + 1);
+  expect_near_rel(area(file.panels.back()), 100 * std::acos(-1.0) - 0.5, 1e-12);
+}
+
+// SolidWorks leaves out the side of a face where its surface is one point.
+TEST(IgesFaces, ASideThatIsAPointMayBeLeftOut) {
+  std::string text = test::corpus_text("collapsed_edge");
+  const std::string all = "102,4,3,5,7,9;";
+  text.replace(text.find(all), all.size(), "102,3,3,5,9;  ");
+  const PanelFile file = parse_iges(text, "three_sides.igs");
+  ASSERT_EQ(file.panels.size(), 2u);
+  expect_near_rel(area(file.panels[0]), areas("collapsed_edge").at(0), 1e-13);
+}
+
 TEST(IgesFaces, InstancesAreScaledTurnedAndNested) {
   const PanelFile file = read_corpus("instances_and_groups");
   ASSERT_EQ(file.panels.size(), 2u);
