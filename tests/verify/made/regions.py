@@ -55,6 +55,27 @@ def integrate(f, box, depth=0, whole=None, scale=None):
     return sum(integrate(f, p, depth + 1, s, scale) for p, s in zip(parts, sums))
 
 
+def strips(surface, chart, slope, cuts, crossings, low, high):
+    """The area between two curves v = low(x), v = high(x) over u = chart(x): cut at the places `cuts` of x, where a
+    curve meets one of the surface's lines v = break (crossings(break)), and within each strip along those lines. On
+    each piece everything is smooth, whatever the surface's breaks."""
+    u_breaks, v_breaks = surface.breaks
+    places = sorted({*cuts, *(x for b in v_breaks for x in crossings(b))})
+    places = [x for x in places if cuts[0] <= x <= cuts[-1]]
+    total = 0.0
+    for x0, x1 in zip(places, places[1:]):
+        middle = (x0 + x1) / 2
+        edges = [low, *((lambda x, b=b: b) for b in v_breaks if low(middle) < b < high(middle)), high]
+        for lower, upper in zip(edges, edges[1:]):
+
+            def f(x, t, lower=lower, upper=upper):
+                a, b = lower(x), upper(x)
+                return stretch(surface, chart(x), a + (b - a) * t) * (b - a) * slope(x)
+
+            total += integrate(f, (x0, x1, 0.0, 1.0))
+    return total
+
+
 class Rectangle:
     def __init__(self, u0, u1, v0, v1):
         self.box = (u0, u1, v0, v1)
@@ -76,23 +97,30 @@ def polygon(corners):
 
 
 class Polygon:
-    """Star-shaped about its first corner."""
+    """Convex, counter-clockwise."""
 
     def __init__(self, *corners):
         self.corners = list(corners)
 
     def area(self, surface):
-        a = self.corners[0]
-        total = 0.0
-        for b, c in zip(self.corners[1:], self.corners[2:]):
-            cross = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        edges = list(zip(self.corners, self.corners[1:] + self.corners[:1]))
+        u = [corner[0] for corner in self.corners]
+        cuts = sorted({*u, *(b for b in surface.breaks[0] if min(u) < b < max(u))})
 
-            def f(s, t, b=b, c=c, cross=cross):
-                x = [a[k] + s * ((1 - t) * (b[k] - a[k]) + t * (c[k] - a[k])) for k in range(2)]
-                return stretch(surface, *x) * s * abs(cross)
+        def section(edges_on_side):
+            def at(x):
+                (a, b), = [e for e in edges_on_side if min(e[0][0], e[1][0]) <= x <= max(e[0][0], e[1][0])][:1]
+                return a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0])
+            return at
 
-            total += integrate(f, (0.0, 1.0, 0.0, 1.0))
-        return total
+        def crossings(v):
+            for a, b in edges:
+                if min(a[1], b[1]) < v < max(a[1], b[1]):
+                    yield a[0] + (b[0] - a[0]) * (v - a[1]) / (b[1] - a[1])
+
+        # Counter-clockwise, what runs to larger u lies below.
+        low, high = (section([e for e in edges if (e[1][0] - e[0][0]) * way > 0]) for way in (1, -1))
+        return strips(surface, lambda x: x, lambda x: 1.0, cuts, crossings, low, high)
 
     def curves(self):
         return polygon(self.corners)
@@ -106,11 +134,17 @@ class Ellipse:
 
     def area(self, surface):
         (u, v), (a, b) = self.centre, self.axes
+        half = math.pi / 2
+        cuts = [-half, *sorted(math.asin((x - u) / a) for x in surface.breaks[0] if abs(x - u) < a), half]
 
-        def f(r, t):
-            return stretch(surface, u + a * r * math.cos(t), v + b * r * math.sin(t)) * a * b * r
+        def crossings(y):
+            if abs(y - v) < b:
+                x = math.acos(abs(y - v) / b)
+                yield from (-x, x)
 
-        return sum(integrate(f, (0.0, 1.0, k * math.pi / 2, (k + 1) * math.pi / 2)) for k in range(4))
+        # u = centre + a sin x: the ends of the sections are smooth in x.
+        return strips(surface, lambda x: u + a * math.sin(x), lambda x: a * math.cos(x), cuts, crossings,
+                      lambda x: v - b * math.cos(x), lambda x: v + b * math.cos(x))
 
     def curves(self):
         (u, v), (a, b) = self.centre, self.axes
