@@ -121,13 +121,18 @@ class Closer {
 
   double gap_in_space(const Vector2d& a, const Vector2d& b) const { return (jet_at(a).x - jet_at(b).x).norm(); }
 
+  // What a double of the domain's size can't tell.
+  double rounding_at(Axis axis) const {
+    const std::vector<double>& lines = lines_[axis == Axis::u ? 0 : 1];
+    return std::numeric_limits<double>::epsilon() * std::max(std::abs(lines.front()), std::abs(lines.back()));
+  }
+
   // Largest excursion of a curve beyond a line, and where; exact zero where it stays within.
   std::pair<double, Vector2d> excursion(const TrimCurve& c, Axis axis, bool beyond_max) {
     const std::size_t a = axis == Axis::u ? 0 : 1;
     const double line = beyond_max ? lines_[a].back() : lines_[a].front();
     const int beyond = beyond_max ? 1 : -1;
-    const double unit =
-        std::numeric_limits<double>::epsilon() * std::max(std::abs(lines_[a].front()), std::abs(lines_[a].back()));
+    const double unit = rounding_at(axis);
     std::pair<double, Vector2d> worst{0, {0, 0}};
     for (const TrimSpan& span : trim_spans(c.curve)) {
       const LineForm form(span, axis, line);
@@ -164,7 +169,8 @@ class Closer {
         for (const bool beyond_max : {false, true}) {
           const double hull =
               beyond_max ? c.curve.points().row(a).maxCoeff() - max : min - c.curve.points().row(a).minCoeff();
-          if (!(hull > 0)) continue;
+          // Points of spans are rounded, by less than this.
+          if (!(hull > -4 * rounding_at(axis))) continue;
           const auto [out, place] = excursion(c, axis, beyond_max);
           if (out == 0) continue;
           if (out > reach(place, a)) {

@@ -58,8 +58,8 @@ std::vector<std::size_t> order_by_ends(const std::vector<std::array<Point, 2>>& 
   return order;
 }
 
-// A curve cut where it turns a corner: one curve may run all around a face.
-std::vector<Curve3> smooth_pieces(const Curve3& c) {
+// A curve cut where it turns a corner: one curve may run all around a face, whose size this is.
+std::vector<Curve3> smooth_pieces(const Curve3& c, double size) {
   std::vector<double> corners;
   const int p = c.degree();
   for (int i = p + 1; i + p <= c.knots().control_point_count(); ++i) {
@@ -67,6 +67,8 @@ std::vector<Curve3> smooth_pieces(const Curve3& c) {
       continue;
     const Vector3d before = c.points().col(i - 1) - c.points().col(i - 2),
                    after = c.points().col(i) - c.points().col(i - 1);
+    // Where a curve stands still its legs are rounding.
+    if (std::min(before.norm(), after.norm()) <= 1e-7 * size) continue;
     if (!corners.empty() && corners.back() == c.knots()[i]) continue;
     if (before.dot(after) <= 0 || before.cross(after).norm() > corner * before.dot(after))
       corners.push_back(c.knots()[i]);
@@ -400,7 +402,7 @@ class LoopCurves {
     std::vector<Curve3> pieces;
     std::vector<int> number;
     for (const Curve3& m : boundary.model)
-      for (Curve3& piece : smooth_pieces(m)) {
+      for (Curve3& piece : smooth_pieces(m, plane_.size)) {
         pieces.push_back(std::move(piece));
         number.push_back(static_cast<int>(&m - boundary.model.data()));
       }
