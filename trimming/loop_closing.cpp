@@ -140,13 +140,18 @@ class Closer {
       for (int i = 0; i <= form.degree(); ++i) hull = hull || form.coefficient_sign(i) == beyond;
       if (!hull) continue;
       bool leaves = form.sign_after_start() == beyond || form.sign_before_end() == beyond;
-      for (const LineRoot& root : roots(form, counts_)) leaves = leaves || root.crosses;
+      Vector2d at = span.at(0.5);
+      for (const LineRoot& root : roots(form, counts_)) {
+        leaves = leaves || root.crosses;
+        at = span.at(root.s());
+      }
       if (!leaves) continue;
+      // What no double of this size can show, and no sample below, is still an excursion.
+      if (worst.first == 0) worst = {unit, at};
       for (int k = 0; k <= 64; ++k) {
         const Vector2d x = span.at(k / 64.0);
         const double out = beyond * (x[static_cast<Eigen::Index>(a)] - line);
-        // What no double of this size can show is still an excursion.
-        if (out >= worst.first) worst = {std::max(out, unit), x};
+        if (out > worst.first) worst = {out, x};
       }
     }
     return worst;

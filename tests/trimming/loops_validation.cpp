@@ -177,6 +177,15 @@ TEST(LoopValidation, MovesAnExcursionIntoTheDomainThatNoSampleShows) {
   expect_laws(face, trace_trims(face));
 }
 
+// Beyond the border by 1e-16 between two samples: (s - 0.3)^2, all but.
+TEST(LoopValidation, MovesATouchBeyondTheBorderIntoTheDomain) {
+  TrimmedSurface face = with_outline(
+      loop_of({bezier_curve({{1, 0.09}, {2, -0.21 * (1 + 1e-15)}, {3, 0.49}}), line_segment<2>({3, 0.49}, {3, 4}),
+               line_segment<2>({3, 4}, {1, 4}), line_segment<2>({1, 4}, {1, 0.09})}));
+  EXPECT_TRUE(reports(validate_loops(face), "into the domain"));
+  expect_laws(face, trace_trims(face));
+}
+
 // The curve touches v = 0 from within while its net goes beyond; what snaps its ends to v = 0 takes it out.
 TEST(LoopValidation, WhatSnapsStaysInTheDomain) {
   const double d = 5e-7, e = 2e-6, g = (d + 4 * e) / 3;
