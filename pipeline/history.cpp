@@ -94,9 +94,11 @@ std::string History::row(const RunResult& now) const {
     least = least.min(strain), largest = largest.max(strain);
   }
   const bool stepped = now.steps > 0;
+  EnergyBalance energy = now.energy;
+  energy.gravity = gravity_potential(build_, q);
   std::vector<std::string> cells{std::to_string(now.frames - 1), std::to_string(now.steps), text(now.state.t),
                                  text(stepped ? now.dt_last : 0)};
-  for (const auto& [what, joule] : energy_entries(now.energy)) cells.push_back(text(joule));
+  for (const auto& [what, joule] : energy_entries(energy)) cells.push_back(text(joule));
   for (const int c : {0, 1}) {
     cells.push_back(text(largest[c]));
     cells.push_back(text(least[c]));

@@ -68,8 +68,9 @@ Eigen::Vector3d beside_the_drape(const std::vector<OutputFace>& faces, const Eig
   const double overlap = flat.max()[axis] - draped.min()[axis] + 0.1 * size;
   const double step = std::pow(10.0, std::floor(std::log10(size))) / 10;
   const double length = step * std::ceil(overlap / step);
-  if (!(size > 0) || !std::isfinite(length)) return Eigen::Vector3d::Zero();
-  return -length * Eigen::Vector3d::Unit(axis);
+  Eigen::Vector3d move = Eigen::Vector3d::Zero();
+  if (size > 0 && std::isfinite(length)) move[axis] = -length;
+  return move;
 }
 
 }  // namespace

@@ -96,17 +96,14 @@ bool runs_along(const Curve2& curve, int direction, double line) {
   return (curve.points().row(direction).array() == line).all();
 }
 
-// Does the trim follow the whole edge of the domain?
-bool trim_follows(const TrimmedSurface& face, const Edge& edge) {
-  const double line = line_of(face.surface, edge);
-  const Interval across = domain_of(face.surface, 1 - edge.direction);
+// Do these curves cover the whole edge of the domain? Curves that don't run along it count for nothing.
+bool cover(const std::vector<const Curve2*>& curves, const Edge& edge, const NurbsSurface& surface) {
+  const Interval across = domain_of(surface, 1 - edge.direction);
   std::vector<Interval> covered;
-  for (const TrimLoop& loop : face.loops) {
-    for (const TrimCurve& trim : loop.curves) {
-      if (!runs_along(trim.curve, edge.direction, line)) continue;
-      const double a = trim.curve.start()[1 - edge.direction], b = trim.curve.end()[1 - edge.direction];
-      covered.push_back({std::min(a, b), std::max(a, b)});
-    }
+  for (const Curve2* curve : curves) {
+    if (!runs_along(*curve, edge.direction, line_of(surface, edge))) continue;
+    const double a = curve->start()[1 - edge.direction], b = curve->end()[1 - edge.direction];
+    covered.push_back({std::min(a, b), std::max(a, b)});
   }
   std::ranges::sort(covered, {}, &Interval::min);
   double reached = across.min;
@@ -116,32 +113,79 @@ bool trim_follows(const TrimmedSurface& face, const Edge& edge) {
   return reached >= across.max;
 }
 
+// Does the trim follow the whole edge of the domain?
+bool trim_follows(const TrimmedSurface& face, const Edge& edge) {
+  std::vector<const Curve2*> curves;
+  for (const TrimLoop& loop : face.loops) {
+    for (const TrimCurve& trim : loop.curves) curves.push_back(&trim.curve);
+  }
+  return cover(curves, edge, face.surface);
+}
+
 // Positions of the file's loop and curve numbers.
 struct CurvePosition {
   int loop = 0, curve = 0;
 };
-CurvePosition find_curve(const Address& at, const PanelPlaces& panel, const std::string& who) {
-  for (std::size_t l = 0; l < panel.face.loops.size(); ++l) {
-    const TrimLoop& loop = panel.face.loops[l];
-    if (loop.index != at.a) continue;
-    for (std::size_t c = 0; c < loop.curves.size(); ++c) {
-      if (loop.curves[c].index == at.b) return {static_cast<int>(l), static_cast<int>(c)};
-    }
-    throw GeometryError(
-        fmt::format("{}: loop {} of panel '{}' has curves 0 to {}", who, at.a, panel.name, loop.curves.size() - 1));
+
+// What is left of the file's curve, in its direction: reading cuts a curve where another loop meets it, and its pieces
+// keep its number and its parameters.
+std::vector<CurvePosition> find_curve(const Address& at, const PanelPlaces& panel, const std::string& who) {
+  const std::vector<TrimLoop>& loops = panel.face.loops;
+  const auto loop = std::ranges::find(loops, at.a, &TrimLoop::index);
+  if (loop == loops.end()) {
+    throw GeometryError(fmt::format("{}: panel '{}' has loops 0 to {}", who, panel.name, loops.size() - 1));
   }
-  throw GeometryError(fmt::format("{}: panel '{}' has loops 0 to {}", who, panel.name, panel.face.loops.size() - 1));
+  const std::vector<TrimCurve>& curves = loop->curves;
+  std::vector<CurvePosition> pieces;
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    if (curves[c].index == at.b) pieces.push_back({static_cast<int>(loop - loops.begin()), static_cast<int>(c)});
+  }
+  if (pieces.empty()) {
+    const int last = std::ranges::max(curves, {}, &TrimCurve::index).index;
+    throw GeometryError(fmt::format("{}: loop {} of panel '{}' has curves 0 to {}", who, at.a, panel.name, last));
+  }
+  const auto curve_at = [&](const CurvePosition& p) -> const TrimCurve& {
+    return curves[static_cast<std::size_t>(p.curve)];
+  };
+  if (curve_at(pieces.front()).reversed) std::ranges::reverse(pieces);
+  std::ranges::stable_sort(pieces, {}, [&](const CurvePosition& p) { return curve_at(p).curve.domain().min; });
+  return pieces;
 }
 
-// The edge of the domain that a curve covers from end to end, if it does.
-std::optional<Edge> whole_edge(const Curve2& curve, const NurbsSurface& surface) {
+// The part of a piece that an address names, as fractions of the piece's length.
+struct PathPart {
+  CurveOnSurface path;
+  double from = 0, to = 1;
+};
+
+std::vector<PathPart> path_of(const Address& at, const std::vector<CurvePosition>& pieces, const PanelPlaces& panel) {
+  std::vector<PathPart> parts;
+  double length = 0;
+  for (const CurvePosition& p : pieces) {
+    parts.push_back({CurveOnSurface(panel.face, panel.topology, p.loop, p.curve, panel.rest), at.from, at.to});
+    length += parts.back().path.length();
+  }
+  if (parts.size() == 1) return parts;
+  std::vector<PathPart> named;
+  double before = 0;
+  for (PathPart& part : parts) {
+    const double own = part.path.length();
+    part.from = std::max(0.0, (at.from * length - before) / own);
+    part.to = std::min(1.0, (at.to * length - before) / own);
+    before += own;
+    if (part.from < part.to) named.push_back(std::move(part));
+  }
+  return named;
+}
+
+// The edge of the domain that curves cover from end to end, if they do.
+std::optional<Edge> whole_edge(const std::vector<const Curve2*>& curves, const NurbsSurface& surface) {
   for (int direction = 0; direction < 2; ++direction) {
     for (int end = 0; end < 2; ++end) {
       const Edge edge{direction, end};
-      if (!runs_along(curve, direction, line_of(surface, edge))) continue;
-      const Interval across = domain_of(surface, 1 - direction);
-      const double a = curve.start()[1 - direction], b = curve.end()[1 - direction];
-      if (std::min(a, b) == across.min && std::max(a, b) == across.max) return edge;
+      const double line = line_of(surface, edge);
+      const bool along = std::ranges::all_of(curves, [&](const Curve2* c) { return runs_along(*c, direction, line); });
+      if (along && cover(curves, edge, surface)) return edge;
     }
   }
   return std::nullopt;
@@ -222,21 +266,26 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
       break;
     }
     case Address::Kind::curve: {
-      const CurvePosition position = find_curve(at, panel, who);
-      const TrimCurve& trim =
-          panel.face.loops[static_cast<std::size_t>(position.loop)].curves[static_cast<std::size_t>(position.curve)];
-      const auto edge = whole_edge(trim.curve, surface);
+      const std::vector<CurvePosition> pieces = find_curve(at, panel, who);
+      std::vector<const Curve2*> curves;
+      for (const CurvePosition& p : pieces) {
+        const TrimLoop& loop = panel.face.loops[static_cast<std::size_t>(p.loop)];
+        curves.push_back(&loop.curves[static_cast<std::size_t>(p.curve)].curve);
+      }
+      const auto edge = whole_edge(curves, surface);
       if (edge && at.from == 0 && at.to == 1) {
         add_edge(*edge, clamp, surface, held.control_points);
         break;
       }
       if (clamp) no_clamp(who);
-      const CurveOnSurface path(panel.face, panel.topology, position.loop, position.curve, surface);
-      const std::vector<double> t = path.breaks(at.from, at.to);
       held.every_point = false;
-      for (std::size_t k = 0; k < t.size(); ++k) {
-        if (k > 0) held.points.push_back(path.uv((t[k - 1] + t[k]) / 2));
-        held.points.push_back(path.uv(t[k]));
+      for (const PathPart& part : path_of(at, pieces, panel)) {
+        const std::vector<double> t = part.path.breaks(part.from, part.to);
+        for (std::size_t k = 0; k < t.size(); ++k) {
+          if (k > 0) held.points.push_back(part.path.uv((t[k - 1] + t[k]) / 2));
+          const Eigen::Vector2d uv = part.path.uv(t[k]);
+          if (held.points.empty() || held.points.back() != uv) held.points.push_back(uv);  // pieces share their ends
+        }
       }
       break;
     }
@@ -312,12 +361,13 @@ std::vector<LinePoint> line_points(const Address& along, const PanelPlaces& pane
     }
   };
   if (along.kind == Address::Kind::curve) {
-    const CurvePosition position = find_curve(along, panel, who);
-    const CurveOnSurface path(panel.face, panel.topology, position.loop, position.curve, panel.rest);
-    const std::vector<double> t = path.breaks(along.from, along.to);
-    for (std::size_t k = 1; k < t.size(); ++k) {
-      integrate(
-          t[k - 1], t[k], [&](double s) { return path.uv(s); }, [&](double s) { return path.speed(s); });
+    for (const PathPart& part : path_of(along, find_curve(along, panel, who), panel)) {
+      const CurveOnSurface& path = part.path;
+      const std::vector<double> t = path.breaks(part.from, part.to);
+      for (std::size_t k = 1; k < t.size(); ++k) {
+        integrate(
+            t[k - 1], t[k], [&](double s) { return path.uv(s); }, [&](double s) { return path.speed(s); });
+      }
     }
     return points;
   }

@@ -84,7 +84,7 @@ class Loop {
     if (result_.exit == RunExit::ok && scene_.rest && !at_rest()) report_unrest();
     if (result_.exit == RunExit::ok) check_energy();
     result_.time = result_.state.t;
-    weigh();
+    result_.energy.gravity = gravity_potential(build_, control_points(*result_.system, result_.state));
     result_.wall_seconds = since(start_);
     return std::move(result_);
   }
@@ -127,18 +127,8 @@ class Loop {
     }
   }
 
-  // The potential of gravity, which no step needs.
-  void weigh() {
-    const Eigen::VectorXd moved = control_points(*result_.system, result_.state) - build_.start;
-    result_.energy.gravity = 0;
-    for (int i = 0; i < build_.model->control_point_count(); ++i) {
-      result_.energy.gravity -= build_.model->lumped_mass()[i] * scene_.gravity.dot(moved.segment<3>(3 * i));
-    }
-  }
-  void resumable() {
-    if (!hooks_.resumable) return;
-    weigh();
-    hooks_.resumable(result_);
+  void resumable() const {
+    if (hooks_.resumable) hooks_.resumable(result_);
   }
   void finish_target(double t) {
     result_.loop.done = t;
@@ -539,6 +529,15 @@ void require_time_left(const Build& build, const RunState& state) {
   if (state.state.t <= scene.until) return;
   throw InputError(fmt::format("{}: solver.until is {} s, but the run to be resumed is at {} s already",
                                scene.path.string(), scene.until, state.state.t));
+}
+
+double gravity_potential(const Build& build, const Eigen::VectorXd& q) {
+  const Eigen::VectorXd moved = q - build.start;
+  double potential = 0;
+  for (int i = 0; i < build.model->control_point_count(); ++i) {
+    potential -= build.model->lumped_mass()[i] * build.scene.gravity.dot(moved.segment<3>(3 * i));
+  }
+  return potential;
 }
 
 RunResult run(const Build& build, const RunHooks& hooks) {

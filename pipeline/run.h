@@ -38,7 +38,7 @@ struct EnergyBalance {
   double membrane = 0, bending = 0, limit = 0;           // J, now; limit: of the strain limits
   double start = 0;                                      // J, kinetic and elastic at the start
   double load_work = 0, drag_work = 0, motion_work = 0;  // J, since the start
-  double gravity = 0;                                    // J, potential against the start
+  double gravity = 0;                                    // J, potential against the start; at the end of a run
   double injected = 0;  // J, largest rise of the balance above the start, 0 where it never rose
   double elastic() const { return membrane + bending + limit; }
   double now() const { return kinetic + elastic(); }
@@ -103,6 +103,9 @@ struct RunHooks {
   std::function<void(const RunResult&)> resumable;
   std::function<RunExit()> stop;  // asked after each step, so that every run gets ahead; not ok: finish now with this
 };
+
+// Potential of a state in the scene's gravity, against the start [J].
+double gravity_potential(const Build& build, const Eigen::VectorXd& q);
 
 // So far may material points swing when let go at the end of a run until rest [m].
 double rest_tolerance(const Build& build);

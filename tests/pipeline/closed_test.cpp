@@ -161,12 +161,15 @@ TEST(Closed, ASeamsPointsAreTakenOnce) {
   for (const int degree : {2, 3}) {
     const Build b = built(tube(degree), test::scene_text(rim));
     const auto system = assemble(b, 0);
-    int seam = 0;
+    int seam = 0, opposite = 0;
     for (const StrainRow& row : system->projection->rows().strain) {
       EXPECT_LT(row.uv.x(), 12);
       seam += row.uv.x() == 0;
+      opposite += row.uv.x() == 6;
     }
-    EXPECT_GT(seam, 0);
+    EXPECT_GE(seam, 2 * 5);
+    // At p = 3 the rows lie elsewhere on the other side.
+    EXPECT_TRUE(degree == 3 || seam == opposite) << seam << " rows at the seam, " << opposite << " opposite";
     for (const ConstraintPoint& point : b.panels[0].points) {
       EXPECT_FALSE(point.used && point.u == 12) << point.v;
       EXPECT_TRUE(point.used || point.u == 12 || degree == 3)
@@ -374,8 +377,9 @@ TEST(Closed, TheStepIsNearItsLimit) {
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen((k + k.transpose()) / 2, Eigen::EigenvaluesOnly);
     const double limit = 2 / std::sqrt(eigen.eigenvalues().maxCoeff());
     const double ratio = 0.9 * time_step_bound(*b.model, map, system->dynamic.node_mass, b.start).dt / limit;
-    EXPECT_GE(ratio, 0.5);
-    EXPECT_LE(ratio, 0.95);
+    // The bound lies above the largest eigenvalue, by 2 % at most, of which a step loses half.
+    EXPECT_GE(ratio, 0.9 * 0.99);
+    EXPECT_LE(ratio, 0.9 * (1 + 1e-9));
   }
 }
 

@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -85,6 +87,68 @@ TEST(Places, ALineLoadAddsUpToItsLength) {
   for (int i = 0; i < b.model->control_point_count(); ++i) sum += b.loads.force.segment<3>(3 * i);
   expect_near_rel(sum.y(), -2 * 0.75 * 0.34, 1e-12);
   EXPECT_EQ(sum.x(), 0);
+}
+
+// The trimmed sheet with a notch: a hole that pokes out through curve 0, of which 120 mm on either side are left.
+// Backwards: the file's outline runs clockwise.
+TrimmedSurface notched_sheet(bool backwards = false) {
+  TrimmedSurface face = test::trimmed_sheet("cloth");
+  TrimLoop notch;
+  notch.kind = LoopKind::hole;
+  notch.index = 1;
+  const std::array<Eigen::Vector2d, 4> corner{{{150, 5}, {150, 70}, {250, 70}, {250, 5}}};
+  for (int k = 0; k < 4; ++k) {
+    TrimCurve side;
+    side.curve = line_segment<2>(corner[static_cast<std::size_t>(k)], corner[static_cast<std::size_t>((k + 1) % 4)]);
+    side.index = k;
+    notch.curves.push_back(side);
+  }
+  face.loops.push_back(notch);
+  if (backwards) {
+    for (TrimCurve& c : face.loops[0].curves) c.curve = reversed(c.curve), c.reversed = true;
+  }
+  return face;
+}
+
+TEST(Places, ACurveCutInTwoIsReachedWhole) {
+  const Folder folder("pieces");
+  const Build b = built(folder, notched_sheet(), test::scene_text("[[pin]]\nat = \"curve:0,0\"\n"));
+  ASSERT_EQ(std::ranges::count(b.panels[0].face.loops[0].curves, 0, &TrimCurve::index), 2);
+  const auto system = assemble(b, 0);
+  int left = 0, right = 0;
+  for (const PlaceRow& row : system->projection->rows().place) {
+    const Eigen::Vector3d at = row.target(0);
+    expect_near_rel(at.y(), 0.02, 1e-9);
+    if (at.x() < 0.15 + 1e-9) ++left;
+    if (at.x() > 0.25 - 1e-9) ++right;
+  }
+  EXPECT_GE(left, 2);
+  EXPECT_GE(right, 2);
+  EXPECT_EQ(left + right, system->place_rows);
+}
+
+TEST(Places, FractionsOfACurveCutInTwoAreOfWhatIsLeftInTheFilesDirection) {
+  struct Case {
+    const char* range;
+    double length, middle;  // m, of the part and of where it lies in x
+  };
+  for (const bool backwards : {false, true}) {
+    for (const Case& c : {Case{"", 0.24, 0.2}, Case{",0,0.5", 0.12, 0.09}, Case{",0.5,1", 0.12, 0.31},
+                          Case{",0.25,0.75", 0.12, 0.2}, Case{",0.75,1", 0.06, 0.34}}) {
+      const Folder folder("pieces_load");
+      const Build b = built(
+          folder, notched_sheet(backwards),
+          test::scene_text(std::string("[[traction]]\nalong = \"curve:0,0") + c.range + "\"\nforce = [0, -2, 0]\n",
+                           "[load]\ngravity = [0, 0, 0]\n"));
+      double force = 0, moment = 0;
+      for (int i = 0; i < b.model->control_point_count(); ++i) {
+        force += b.loads.force[3 * i + 1];
+        moment += b.start[3 * i] * b.loads.force[3 * i + 1];
+      }
+      expect_near_rel(force, -2 * c.length, 1e-10);
+      expect_near_rel(moment / force, backwards ? 0.4 - c.middle : c.middle, 1e-10);
+    }
+  }
 }
 
 TEST(Places, CurvePinRowsAreIndependent) {
@@ -466,7 +530,21 @@ TEST(Run, StoppingLeavesAWholeResult) {
   const RunResult result = run(b, hooks);
   EXPECT_EQ(result.exit, RunExit::interrupted);
   EXPECT_EQ(result.steps, 3);
-  EXPECT_GT(result.time, 0);
+  EXPECT_EQ(result.time, result.state.t);
+  EXPECT_GE(result.time, 3 * result.dt_min * (1 - 1e-12));
+  EXPECT_LE(result.time, 3 * result.dt_max * (1 + 1e-12));
+}
+
+// The cloth as a whole moved by d: -m g d.
+TEST(Run, TheGravityPotentialIsThatOfTheMassMoved) {
+  const Folder folder("potential");
+  const Build b =
+      built(folder, test::trimmed_sheet("cloth"), test::scene_text(corner_pins, "[load]\ngravity = [1, -2, -9]\n"));
+  EXPECT_EQ(gravity_potential(b, b.start), 0);
+  const Eigen::Vector3d moved(0.3, -0.2, 0.7);
+  const Eigen::VectorXd q = b.start + moved.replicate(b.start.size() / 3, 1);
+  const double mass = b.model->lumped_mass().sum();
+  expect_near_rel(gravity_potential(b, q), -mass * Eigen::Vector3d(1, -2, -9).dot(moved), 1e-12);
 }
 
 }  // namespace
