@@ -401,11 +401,15 @@ class LoopCurves {
     Pulled out;
     std::vector<Curve3> pieces;
     std::vector<int> number;
-    for (const Curve3& m : boundary.model)
+    for (const Curve3& m : boundary.model) {
+      // The side of a surface that is one point in space: bridge_poles() adds it, where the others end.
+      if (boundary.model.size() > 1 && (m.points().colwise() - m.points().col(0)).norm() <= 1e-7 * plane_.size)
+        continue;
       for (Curve3& piece : smooth_pieces(m, plane_.size)) {
         pieces.push_back(std::move(piece));
         number.push_back(static_cast<int>(&m - boundary.model.data()));
       }
+    }
     std::vector<Curve3> model = pieces;
     std::vector<std::array<Vector3d, 2>> ends;
     for (const Curve3& m : model) ends.push_back({m.start(), m.end()});
