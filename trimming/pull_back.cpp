@@ -206,9 +206,10 @@ class Puller {
     for (Place& p : places_)
       for (int k = 0; k < 2; ++k)
         if (constant_[static_cast<std::size_t>(k)]) p.uv[k] = *constant_[static_cast<std::size_t>(k)];
-    // Ends within the snap of a border lie on it.
+    // Ends within the snap of a border lie on it. Where the surface is collapsed every value does, and says nothing.
     for (Place* p : {&places_.front(), &places_.back()})
       for (int k = 0; k < 2; ++k) {
+        if (p->lost[static_cast<std::size_t>(k)]) continue;
         const Interval d = domain_[static_cast<std::size_t>(k)];
         const SurfaceJet j = jet(p->uv);
         for (const double line : {d.min, d.max})

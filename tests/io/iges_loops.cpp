@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "geometry/error.h"
+#include "geometry/refine.h"
 #include "io/iges/face.h"
 #include "io/iges/surfaces.h"
 #include "support/near.h"
@@ -199,6 +200,41 @@ TEST(IgesLoops, TheSideAtAPoleMayBeLeftOutOfALoop) {
       ASSERT_EQ(r.panels.size(), 1u);
       expect_near_rel(r.area, pi * 2 * 2, 1e-8);
     }
+}
+
+// Two meridians and a parallel in space, from any of the three on and either way round: at the pole every angle is
+// right.
+TEST(IgesLoops, MeridiansMeetAtAPoleWhereverTheirLoopBegins) {
+  const double radius = 2, lowest = 0.7;  // radians from the pole
+  const auto meridian = [&](double angle) {
+    const Curve2 arc = circular_arc({0, 0}, radius, pi / 2 - lowest, pi / 2);  // (from the axis, up)
+    Eigen::Matrix3Xd points(3, arc.points().cols());
+    points << arc.points().row(0) * std::cos(angle), arc.points().row(0) * std::sin(angle), arc.points().row(1);
+    return Curve3(arc.knots(), points, arc.weights());
+  };
+  const auto parallel = [&](double from, double to) {
+    const Curve2 arc = circular_arc({0, 0}, radius * std::sin(lowest), from, to);
+    Eigen::Matrix3Xd points(3, arc.points().cols());
+    points << arc.points(), Eigen::RowVectorXd::Constant(arc.points().cols(), radius * std::cos(lowest));
+    return Curve3(arc.knots(), points, arc.weights());
+  };
+  for (const auto& [from, to] : std::vector<std::pair<double, double>>{
+           {0.3, 1.9}, {0, pi / 2}, {1.9, 6.1}, {4, 6.2}, {5.9, 6.2}, {3, 4}, {0, 2}, {5, 2 * pi}})
+    for (int begin = 0; begin < 3; ++begin)
+      for (const bool backwards : {false, true}) {
+        SCOPED_TRACE(testing::Message() << from << " to " << to << ", begins at " << begin << ' ' << backwards);
+        iges::BoundaryCurves loop;
+        loop.place = "here: ";
+        loop.model = {parallel(from, to), meridian(to), reversed(meridian(from))};
+        std::rotate(loop.model.begin(), loop.model.begin() + begin, loop.model.end());
+        if (backwards) {
+          std::ranges::reverse(loop.model);
+          for (Curve3& c : loop.model) c = reversed(c);
+        }
+        const Result r = panels_of(half_sphere(radius), {loop});
+        ASSERT_EQ(r.panels.size(), 1u);
+        expect_near_rel(r.area, (to - from) * radius * radius * (1 - std::cos(lowest)), 1e-7);
+      }
 }
 
 TEST(IgesLoops, ANarrowGapIsClosedByAStraightPieceAndSaid) {
