@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "analysis/fabric/fabric.h"
-#include "analysis/lanes.h"
+#include "analysis/parallel/lanes.h"
 
 namespace toile {
 

@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-#include "analysis/lanes.h"
+#include "analysis/parallel/lanes.h"
 
 namespace toile {
 

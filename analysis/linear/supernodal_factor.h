@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "analysis/workers.h"
+#include "analysis/parallel/workers.h"
 
 namespace toile {
 

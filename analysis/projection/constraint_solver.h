@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "analysis/projection/constraint_rows.h"
+#include "analysis/constraint/constraint_rows.h"
 
 namespace toile {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <utility>
 
+#include "analysis/constraint/composed_rows.h"
 #include "analysis/linear/cholesky.h"
-#include "analysis/projection/composed_rows.h"
-#include "analysis/workers.h"
+#include "analysis/parallel/workers.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
 

@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "analysis/affine_map.h"
-#include "analysis/projection/constraint_rows.h"
+#include "analysis/constraint/constraint_rows.h"
+#include "analysis/map/affine_map.h"
 #include "analysis/projection/constraint_solver.h"
 #include "analysis/projection/limit_law.h"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "analysis/constraint/composed_rows.h"
 #include "analysis/linear/cholesky.h"
-#include "analysis/projection/composed_rows.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
 

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "analysis/affine_map.h"
+#include "analysis/map/affine_map.h"
 #include "analysis/projection/constraint_solver.h"
 #include "analysis/projection/fast_projection.h"
 

@@ -53,4 +53,10 @@ std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopo
   return points;
 }
 
+void drop_strips(const NurbsSurface& surface, const SmoothSeams& seams, std::vector<KinkPoint>& kinks) {
+  std::erase_if(kinks, [&](const KinkPoint& point) {
+    return point.at == surface.knots(point.direction).domain().min && seams.at(surface, point.direction, point.along);
+  });
+}
+
 }  // namespace toile

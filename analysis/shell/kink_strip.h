@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "analysis/map/smooth_seam.h"
 #include "geometry/closure.h"
 #include "trimming/topology.h"
 
@@ -27,6 +28,9 @@ struct KinkPoint {
 // cloth lies on both sides.
 std::vector<KinkPoint> kink_points(const TrimmedSurface& surface, const TrimTopology& topology,
                                    const Closure& closure = {});
+
+// Leaves out the strips that smooth seams don't need.
+void drop_strips(const NurbsSurface& surface, const SmoothSeams& seams, std::vector<KinkPoint>& kinks);
 
 // Width of the strip as part of the narrower neighbouring cell: a line makes the cloth softer by this part of a cell,
 // and where bending bounds the step, the bound falls to about a third. (analysis/README.md)

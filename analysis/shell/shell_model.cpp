@@ -6,11 +6,11 @@
 #include <tuple>
 #include <utility>
 
-#include "analysis/lanes.h"
+#include "analysis/parallel/lanes.h"
+#include "analysis/parallel/workers.h"
 #include "analysis/shell/kink_kernel.h"
 #include "analysis/shell/material_basis.h"
 #include "analysis/shell/point_kernel.h"
-#include "analysis/workers.h"
 #include "geometry/error.h"
 
 namespace toile {

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "pipeline/drape.h"
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/output/drape.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/scene_arguments.h"
 

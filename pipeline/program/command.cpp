@@ -6,8 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "pipeline/exit_code.h"
-#include "pipeline/suggestion.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/suggestion.h"
 
 namespace toile {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/console.h"
+#include "pipeline/base/console.h"
 
 namespace CLI {
 class App;

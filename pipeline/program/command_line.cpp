@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <sstream>
 
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/suggestion.h"
+#include "pipeline/base/version.h"
 #include "pipeline/program/commands.h"
-#include "pipeline/suggestion.h"
-#include "pipeline/version.h"
 
 namespace toile {
 namespace {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <set>
 
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
 #include "pipeline/program/command_line.h"
 #include "pipeline/program/commands.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/convert.h"
+#include "pipeline/convert/convert.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "io/file.h"
-#include "pipeline/exit_code.h"
-#include "pipeline/json_text.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/json_text.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_argument.h"
 #include "pipeline/program/panel_choice.h"

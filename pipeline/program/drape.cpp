@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/drape.h"
+#include "pipeline/output/drape.h"
 
 #include <fmt/format.h>
 
@@ -8,11 +8,11 @@
 #include <memory>
 #include <string>
 
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/output/summary.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_choice.h"
 #include "pipeline/program/scene_arguments.h"
-#include "pipeline/summary.h"
 
 namespace toile {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
 #include "pipeline/program/command_line.h"
 #include "pipeline/program/commands.h"
 

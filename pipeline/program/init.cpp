@@ -10,12 +10,12 @@
 
 #include "geometry/error.h"
 #include "io/file.h"
-#include "pipeline/exit_code.h"
-#include "pipeline/json_text.h"
-#include "pipeline/pattern_scene.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/json_text.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_choice.h"
-#include "pipeline/templates.h"
+#include "pipeline/scene/pattern_scene.h"
+#include "pipeline/scene/templates.h"
 
 namespace toile {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/inspect.h"
+#include "pipeline/inspect/inspect.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "io/file.h"
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_argument.h"
 #include "pipeline/program/panel_choice.h"

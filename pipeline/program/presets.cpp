@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/exit_code.h"
-#include "pipeline/json_text.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/json_text.h"
 #include "pipeline/program/commands.h"
-#include "pipeline/scene.h"
+#include "pipeline/scene/scene.h"
 
 namespace toile {
 namespace {

@@ -14,7 +14,7 @@
 #include <system_error>
 
 #include "geometry/error.h"
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
 #include "pipeline/program/command_line.h"
 
 namespace toile {

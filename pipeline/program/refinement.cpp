@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "geometry/error.h"
-#include "pipeline/units.h"
+#include "pipeline/scene/units.h"
 
 namespace toile {
 

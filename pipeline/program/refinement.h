@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "pipeline/inspect.h"
+#include "pipeline/inspect/inspect.h"
 #include "pipeline/program/command.h"
 
 namespace toile {

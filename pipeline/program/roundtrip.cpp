@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "io/iges.h"
-#include "pipeline/exit_code.h"
-#include "pipeline/inspect.h"
-#include "pipeline/json_text.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/json_text.h"
+#include "pipeline/inspect/inspect.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_argument.h"
 

@@ -7,10 +7,10 @@
 #include <filesystem>
 
 #include "geometry/error.h"
-#include "pipeline/addresses.h"
+#include "pipeline/base/suggestion.h"
 #include "pipeline/program/panel_argument.h"
 #include "pipeline/program/refinement.h"
-#include "pipeline/suggestion.h"
+#include "pipeline/scene/addresses.h"
 
 namespace toile {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "io/panel_file.h"
 #include "pipeline/program/command.h"
-#include "pipeline/scene.h"
+#include "pipeline/scene/scene.h"
 
 namespace toile {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/schema.h"
+#include "pipeline/study/schema.h"
 
 #include <fmt/format.h>
 
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/exit_code.h"
-#include "pipeline/json_text.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/json_text.h"
 #include "pipeline/program/commands.h"
 
 namespace toile {

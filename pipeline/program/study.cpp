@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/study.h"
+#include "pipeline/study/study.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "geometry/error.h"
-#include "pipeline/exit_code.h"
+#include "pipeline/base/exit_code.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_argument.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/affine_map.h"
+#include "analysis/map/affine_map.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/projection/averaged_rows.h"
+#include "analysis/constraint/averaged_rows.h"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "analysis/affine_map.h"
-#include "analysis/dynamics/time_step.h"
+#include "analysis/map/affine_map.h"
+#include "analysis/scheme/time_step.h"
 #include "analysis/shell/kink_strip.h"
 #include "analysis/shell/shell_model.h"
 #include "geometry/refine.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/extension.h"
+#include "analysis/map/extension.h"
 
 #include <gtest/gtest.h>
 

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "analysis/affine_map.h"
-#include "analysis/projection/constraint_rows.h"
+#include "analysis/constraint/constraint_rows.h"
+#include "analysis/map/affine_map.h"
 #include "geometry/basis.h"
 #include "geometry/nurbs_surface.h"
 

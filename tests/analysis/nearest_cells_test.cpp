@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/nearest_cells.h"
+#include "analysis/map/nearest_cells.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/projection/point_rule.h"
+#include "analysis/constraint/point_rule.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <cmath>
 #include <set>
 
-#include "analysis/dynamics/time_step.h"
-#include "analysis/dynamics/verlet.h"
+#include "analysis/constraint/select_rows.h"
 #include "analysis/projection/fast_projection.h"
-#include "analysis/projection/select_rows.h"
+#include "analysis/scheme/time_step.h"
+#include "analysis/scheme/verlet.h"
 #include "geometry/refine.h"
 #include "support/panels.h"
 

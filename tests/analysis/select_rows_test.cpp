@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/projection/select_rows.h"
+#include "analysis/constraint/select_rows.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "analysis/extension.h"
+#include "analysis/map/extension.h"
 #include "analysis/projection/fast_projection.h"
 #include "geometry/basis.h"
 #include "geometry/error.h"

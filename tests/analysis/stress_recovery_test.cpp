@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/projection/stress_recovery.h"
+#include "analysis/constraint/stress_recovery.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/projection/point_rule.h"
-#include "analysis/projection/select_rows.h"
+#include "analysis/constraint/point_rule.h"
+#include "analysis/constraint/select_rows.h"
 #include "support/near.h"
 #include "support/panels.h"
 

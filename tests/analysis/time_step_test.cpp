@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/dynamics/time_step.h"
+#include "analysis/scheme/time_step.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

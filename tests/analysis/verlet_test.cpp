@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/dynamics/verlet.h"
+#include "analysis/scheme/verlet.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "analysis/workers.h"
+#include "analysis/parallel/workers.h"
 
 #include <gtest/gtest.h>
 

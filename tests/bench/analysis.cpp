@@ -11,9 +11,9 @@
 #include <Eigen/SparseLU>
 #include <memory>
 
+#include "analysis/constraint/composed_rows.h"
 #include "analysis/flat_cloth.h"
 #include "analysis/linear/cholesky.h"
-#include "analysis/projection/composed_rows.h"
 #include "analysis/projection/lagrange_newton.h"
 #include "analysis/shell/shell_model.h"
 #include "support/panels.h"

@@ -16,7 +16,7 @@
 #include "bench/wavy_surface.h"
 #include "io/file.h"
 #include "io/iges.h"
-#include "pipeline/process.h"
+#include "pipeline/study/process.h"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "geometry/clock.h"
-#include "pipeline/measures.h"
-#include "pipeline/run.h"
+#include "pipeline/run/measures.h"
+#include "pipeline/run/run.h"
 
 namespace toile::bench {
 namespace {

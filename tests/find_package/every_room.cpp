@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "toile/geometry/error.h"
-#include "toile/pipeline/run.h"
+#include "toile/pipeline/run/run.h"
 
 int main(int argc, char** argv) try {
   if (argc != 2) return 2;

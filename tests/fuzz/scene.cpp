@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Any bytes as a scene file: a scene or an InputError, nothing else. Files beside the scene are those of a sample.
-#include "pipeline/scene.h"
+#include "pipeline/scene/scene.h"
 
 #include <cstddef>
 #include <cstdint>

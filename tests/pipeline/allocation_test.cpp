@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "pipeline/panels.h"
-#include "pipeline/run.h"
+#include "pipeline/run/run.h"
 #include "support/allocation_count.h"
 
 namespace toile {

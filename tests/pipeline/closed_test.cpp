@@ -7,13 +7,13 @@
 #include <numbers>
 #include <optional>
 
-#include "analysis/dynamics/time_step.h"
+#include "analysis/scheme/time_step.h"
 #include "geometry/closure.h"
 #include "geometry/error.h"
 #include "io/iges.h"
-#include "pipeline/output.h"
+#include "pipeline/output/output.h"
 #include "pipeline/panels.h"
-#include "pipeline/run.h"
+#include "pipeline/run/run.h"
 #include "support/near.h"
 #include "support/panels.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/convergence.h"
+#include "pipeline/study/convergence.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "geometry/error.h"
-#include "pipeline/convert.h"
+#include "pipeline/convert/convert.h"
 #include "pipeline/panels.h"
 
 namespace toile {

@@ -9,7 +9,7 @@
 #include "geometry/error.h"
 #include "geometry/refine.h"
 #include "pipeline/panels.h"
-#include "pipeline/run.h"
+#include "pipeline/run/run.h"
 
 namespace toile {
 namespace {

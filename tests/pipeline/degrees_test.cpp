@@ -7,9 +7,9 @@
 #include <numbers>
 #include <string>
 
-#include "pipeline/build.h"
-#include "pipeline/convert.h"
-#include "pipeline/inspect.h"
+#include "pipeline/build/build.h"
+#include "pipeline/convert/convert.h"
+#include "pipeline/inspect/inspect.h"
 #include "pipeline/panels.h"
 #include "support/near.h"
 

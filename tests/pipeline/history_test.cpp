@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // history.csv, row by row.
-#include "pipeline/history.h"
+#include "pipeline/output/history.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 #include <sstream>
 
-#include "pipeline/checkpoint.h"
-#include "pipeline/measures.h"
 #include "pipeline/panels.h"
+#include "pipeline/run/checkpoint.h"
+#include "pipeline/run/measures.h"
 
 namespace toile {
 namespace {

@@ -9,7 +9,7 @@
 #include <regex>
 
 #include "geometry/error.h"
-#include "pipeline/inspect.h"
+#include "pipeline/inspect/inspect.h"
 #include "support/near.h"
 
 namespace toile {

@@ -10,12 +10,12 @@
 
 #include "geometry/error.h"
 #include "io/panel_file.h"
-#include "pipeline/body_fit.h"
-#include "pipeline/build.h"
-#include "pipeline/convert.h"
+#include "pipeline/build/build.h"
+#include "pipeline/convert/convert.h"
 #include "pipeline/panels.h"
-#include "pipeline/pattern_scene.h"
-#include "pipeline/scene.h"
+#include "pipeline/scene/body_fit.h"
+#include "pipeline/scene/pattern_scene.h"
+#include "pipeline/scene/scene.h"
 #include "support/near.h"
 
 namespace toile {

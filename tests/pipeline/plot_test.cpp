@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/plot.h"
+#include "pipeline/picture/plot.h"
 
 #include <gtest/gtest.h>
 

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "geometry/error.h"
-#include "pipeline/colour.h"
-#include "pipeline/colour_scale.h"
-#include "pipeline/font.h"
-#include "pipeline/image.h"
-#include "pipeline/preview.h"
-#include "pipeline/stroke_font.h"
+#include "pipeline/picture/colour.h"
+#include "pipeline/picture/colour_scale.h"
+#include "pipeline/picture/font.h"
+#include "pipeline/picture/image.h"
+#include "pipeline/picture/preview.h"
+#include "pipeline/picture/stroke_font.h"
 #include "support/draped.h"
 
 #pragma GCC diagnostic push

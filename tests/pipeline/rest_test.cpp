@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "geometry/error.h"
-#include "pipeline/checkpoint.h"
-#include "pipeline/measures.h"
-#include "pipeline/output.h"
+#include "pipeline/output/output.h"
 #include "pipeline/panels.h"
-#include "pipeline/run.h"
+#include "pipeline/run/checkpoint.h"
+#include "pipeline/run/measures.h"
+#include "pipeline/run/run.h"
 
 namespace toile {
 namespace {

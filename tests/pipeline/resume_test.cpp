@@ -7,10 +7,10 @@
 #include <string>
 
 #include "geometry/error.h"
-#include "pipeline/checkpoint.h"
-#include "pipeline/measures.h"
-#include "pipeline/output.h"
+#include "pipeline/output/output.h"
 #include "pipeline/panels.h"
+#include "pipeline/run/checkpoint.h"
+#include "pipeline/run/measures.h"
 
 namespace toile {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/run.h"
+#include "pipeline/run/run.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -13,10 +13,10 @@
 #include <string>
 
 #include "geometry/error.h"
-#include "pipeline/measures.h"
-#include "pipeline/output.h"
+#include "pipeline/build/places.h"
+#include "pipeline/output/output.h"
 #include "pipeline/panels.h"
-#include "pipeline/places.h"
+#include "pipeline/run/measures.h"
 #include "support/near.h"
 
 namespace toile {

@@ -13,12 +13,12 @@
 
 #include "io/file.h"
 #include "io/iges.h"
-#include "pipeline/build.h"
-#include "pipeline/measures.h"
+#include "pipeline/build/build.h"
 #include "pipeline/panels.h"
-#include "pipeline/run.h"
-#include "pipeline/scene.h"
-#include "pipeline/study.h"
+#include "pipeline/run/measures.h"
+#include "pipeline/run/run.h"
+#include "pipeline/scene/scene.h"
+#include "pipeline/study/study.h"
 #include "support/near.h"
 
 namespace toile {

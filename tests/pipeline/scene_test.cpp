@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/scene.h"
+#include "pipeline/scene/scene.h"
 
 #include <gtest/gtest.h>
 

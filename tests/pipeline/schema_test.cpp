@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The schemas of scenes and studies against the readers, the samples and wrong files.
-#include "pipeline/schema.h"
+#include "pipeline/study/schema.h"
 
 #include <gtest/gtest.h>
 
@@ -16,9 +16,9 @@
 
 #include "geometry/error.h"
 #include "io/file.h"
-#include "pipeline/scene.h"
-#include "pipeline/study.h"
-#include "pipeline/toml_table.h"
+#include "pipeline/scene/scene.h"
+#include "pipeline/scene/toml_table.h"
+#include "pipeline/study/study.h"
 
 namespace toile {
 namespace {

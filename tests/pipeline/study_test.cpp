@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Studies of a program that the tests write themselves: a shell script that takes toile's options and leaves a report.
-#include "pipeline/study.h"
+#include "pipeline/study/study.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

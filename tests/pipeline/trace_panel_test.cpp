@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/trace_panel.h"
+#include "pipeline/build/trace_panel.h"
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,11 @@
 #include <string>
 #include <tuple>
 
-#include "analysis/projection/select_rows.h"
+#include "analysis/constraint/select_rows.h"
 #include "geometry/error.h"
 #include "io/panel_file.h"
-#include "pipeline/build.h"
-#include "pipeline/inspect.h"
+#include "pipeline/build/build.h"
+#include "pipeline/inspect/inspect.h"
 #include "pipeline/panels.h"
 
 namespace toile {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "pipeline/units.h"
+#include "pipeline/scene/units.h"
 
 #include <gtest/gtest.h>
 

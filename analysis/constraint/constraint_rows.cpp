@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "analysis/constraint/constraint_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "analysis/constraint/row_areas.h"
+
+namespace toile {
+namespace {
+
+// Values of exact zeros come out as rounding of the largest.
+constexpr double zero = 1e-13;
+
+ScalarRow make_row(const MaterialPoint& point, int which) {
+  const std::vector<double>& value = point.value[which];
+  double largest = 0;
+  for (double d : value) largest = std::max(largest, std::abs(d));
+  std::vector<int> order(value.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return point.index[a] < point.index[b]; });
+  ScalarRow row;
+  for (int k : order) {
+    if (std::abs(value[k]) <= zero * largest) continue;
+    row.index.push_back(point.index[k]);
+    row.value.push_back(value[k]);
+  }
+  return row;
+}
+
+}  // namespace
+
+std::vector<StrainRow> strain_rows(const ShellModel& model, const AffineMap& map,
+                                   const std::vector<std::vector<ConstraintPoint>>& points) {
+  std::vector<StrainRow> rows;
+  std::vector<ScalarRow> values;
+  for (int panel = 0; panel < static_cast<int>(points.size()); ++panel)
+    for (int k = 0; k < static_cast<int>(points[panel].size()); ++k) {
+      const ConstraintPoint& point = points[panel][k];
+      if (!point.used) continue;
+      const MaterialPoint functions = model.material_point(panel, point.u, point.v);
+      const Eigen::Vector2d uv(point.u, point.v);
+      rows.push_back({make_row(functions, 1), panel, k, false, 0, 0, 0, uv, {1, 0}});
+      rows.push_back({make_row(functions, 2), panel, k, true, 0, 0, 0, uv, {0, 1}});
+      values.insert(values.end(), 2, make_row(functions, 0));
+    }
+  weigh_rows(model, map, values, rows);
+  return rows;
+}
+
+Eigen::Vector3d apply(const ScalarRow& row, const Eigen::Ref<const Eigen::VectorXd>& q) {
+  Eigen::Vector3d y = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * q.segment<3>(3 * row.index[k]);
+  return y;
+}
+
+ScalarRow place_row(const ShellModel& model, int panel, double u, double v) {
+  return make_row(model.material_point(panel, u, v), 0);
+}
+
+}  // namespace toile

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Constraints as sparse scalar rows on control points: everything fast projection needs to know about a scene.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/map/affine_map.h"
+#include "analysis/shell/shell_model.h"
+#include "trimming/constraint_points.h"
+
+namespace toile {
+
+// A row d over control points gives the vector y = sum_I d_I q_I.
+//   strain rows: d = N_,weft or N_,warp at a constraint point; C = (y.y - 1) / 2                 [eq. 36]
+//   place rows:  d = N at a pinned material point; C = y - target(t), three components, always an equality.
+struct ScalarRow {
+  std::vector<int> index;  // control points, ascending
+  std::vector<double> value;
+};
+struct StrainRow {
+  ScalarRow row;
+  int panel = 0;
+  int point = 0;  // in the panel's constraint points; -1: the row is a mean, of no point
+  bool warp = false;
+  double area = 0;               // m2, of the cloth that the row speaks for
+  double stiffness = 0;          // N m, force per strain times area; 0: hard
+  double damping_rate = 0;       // 1/s, with a stiffness: see FastProjection::step
+  Eigen::Vector2d uv{0, 0};      // where it stands on the panel
+  Eigen::Vector2d thread{1, 0};  // unit, in weft and warp: the direction whose strain C is; `warp` says the nearer
+};
+struct PlaceRow {
+  ScalarRow row;
+  int pin = 0;                                    // of the scene, for reactions and messages
+  std::function<Eigen::Vector3d(double)> target;  // place at time t [m]
+};
+
+struct ConstraintRows {
+  std::vector<StrainRow> strain;
+  std::vector<PlaceRow> place;
+};
+
+// Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points()
+// gives them. Functions that vanish at a point (all but p per direction on a C1 knot line) are left out. Rows are hard;
+// their areas are those of weigh_rows().
+std::vector<StrainRow> strain_rows(const ShellModel& model, const AffineMap& map,
+                                   const std::vector<std::vector<ConstraintPoint>>& points);
+
+// y = sum d_I q_I.
+Eigen::Vector3d apply(const ScalarRow& row, const Eigen::Ref<const Eigen::VectorXd>& q);
+
+// The row of one material point's place, for pins.
+ScalarRow place_row(const ShellModel& model, int panel, double u, double v);
+
+}  // namespace toile

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The cloth that strain rows speak for: the weights with which their points integrate a stress.
+#pragma once
+
+#include <vector>
+
+#include "analysis/constraint/constraint_rows.h"
+#include "analysis/map/affine_map.h"
+
+namespace toile {
+
+// Sets `area` of the weft and warp rows of points, both kinds together; `values[r]` has the functions N at the point of
+// rows[r]. They start from shares: each node of the map divides its own cloth among the points that its function
+// reaches, in proportion to the function where that is positive, so that they add up to the panels' area. Weft and warp
+// are then weighed each by itself, between `least` and `most` times the share, so that
+//   sum over r of area_r d_r = integral over the cloth of N_,weft (N_,warp)   for every node, in least squares:
+// a uniform stress of the limit is in equilibrium with what the cloth's border carries. On a uniform net at p = 2 that
+// is the trapezoidal rule along the threads and Simpson's across.
+//   (1) they still add up to the panels' area, but for nodes that reach no point; (2) independent of which nodes pins
+//   hold, but for control points that would follow others (extended, at smooth seams) if no pin held them; (3) no area
+//   is below a thousandth of the panel's mean: such a row would count as hard.
+struct RowAreaOptions {
+  double least = 0.2, most = 3;  // a row that others can stand for needn't vanish, nor one take over its neighbours
+  double damping = 1e-3;         // of a panel's longest equation: weights that are hardly told stay shares
+  int iterations = 200;          // at most: what is not told by then stays near the shares
+};
+void weigh_rows(const ShellModel& model, const AffineMap& map, const std::vector<ScalarRow>& values,
+                std::vector<StrainRow>& rows, const RowAreaOptions& options = {});
+
+}  // namespace toile

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "analysis/scheme/relaxation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace toile {
+namespace {
+
+constexpr int steps_per_halt = 10;
+constexpr double smaller_share = 0.7, smallest_share = 0.1;
+constexpr int least_window = 50, least_trial = 500, windows_at_least = 10;  // of the run so far
+
+// Largest distance between control points that carry cloth.
+double largest_move(const DynamicSystem& system, const Eigen::VectorXd& from, const Eigen::VectorXd& to) {
+  const Eigen::VectorXd& mass = system.model->lumped_mass();
+  double squared = 0;
+  for (Eigen::Index i = 0; i < mass.size(); ++i)
+    if (mass[i] > 0) squared = std::max(squared, (to.segment<3>(3 * i) - from.segment<3>(3 * i)).squaredNorm());
+  return std::sqrt(squared);
+}
+
+void begin(Relaxation& r, bool trial, const Eigen::VectorXd& q) {
+  r.trial = trial;
+  r.length = trial ? std::max(least_trial, r.steps) : std::max(least_window, r.steps / windows_at_least);
+  r.count = 0;
+  r.moved = 0;
+  r.halts_before = r.halts;
+  r.from = q;
+}
+
+}  // namespace
+
+void restart(Relaxation& r) {
+  r.remaining = Relaxation().remaining;
+  r.from.resize(0);
+}
+
+bool relax(const DynamicSystem& system, const StepWork& work, const StepReport& report, double tolerance,
+           DynamicState& state, Relaxation& r) {
+  if (r.from.size() == 0) begin(r, false, work.other.q);
+  ++r.steps;
+  ++r.count;
+  r.moved = std::max(r.moved, largest_move(system, r.from, state.q));
+  if (r.trial && r.moved > tolerance) begin(r, false, state.q);
+  const bool over = r.count >= r.length;
+  const bool halts = r.trial ? over : report.kinetic <= r.kinetic;
+  r.kinetic = halts ? 0 : report.kinetic;
+  if (halts) {
+    ++r.halts;
+    // x~ = x + dt v + dt^2/2 a, and the projection adds dt^2 a_c: from rest the cloth goes dt^2/2 (a + a_c).
+    state.v = -0.5 * report.dt * work.constraint;
+  }
+  if (!over) return halts;
+  if (!r.trial && (r.halts - r.halts_before) * steps_per_halt > r.count)
+    r.dt_share = std::max(smallest_share, smaller_share * r.dt_share);
+  if (r.trial) {
+    r.remaining = r.moved;
+    begin(r, false, state.q);
+  } else if (r.moved > tolerance) {
+    begin(r, false, state.q);
+  } else if (halts) {  // let go from rest
+    ++r.trials;
+    begin(r, true, state.q);
+  }
+  return halts;
+}
+
+}  // namespace toile

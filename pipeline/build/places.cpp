@@ -1,0 +1,387 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pipeline/build/places.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "geometry/error.h"
+#include "geometry/measure.h"
+#include "geometry/quadrature_rule.h"
+
+namespace toile {
+
+CurveOnSurface::CurveOnSurface(const TrimmedSurface& face, const TrimTopology& topology, int loop, int curve,
+                               const NurbsSurface& surface)
+    : curve_(face.loops[static_cast<std::size_t>(loop)].curves[static_cast<std::size_t>(curve)].curve),
+      surface_(surface) {
+  t_ = curve_.knots().breaks();
+  for (const TrimEvent& event : topology.events) {
+    if (event.loop == loop && event.curve == curve) t_.push_back(event.t);
+  }
+  std::ranges::sort(t_);
+  const Interval domain = curve_.domain();
+  // Events that differ by rounding make no piece of their own.
+  const double least = 1e-12 * domain.length();
+  std::vector<double> distinct{domain.min};
+  for (const double t : t_) {
+    if (t > distinct.back() + least && t < domain.max - least) distinct.push_back(t);
+  }
+  distinct.push_back(domain.max);
+  t_ = std::move(distinct);
+  sum_.assign(t_.size(), 0);
+  for (std::size_t k = 1; k < t_.size(); ++k) {
+    sum_[k] = sum_[k - 1] + gauss8([&](double t) { return speed(t); }, t_[k - 1], t_[k]);
+  }
+}
+
+Eigen::Vector2d CurveOnSurface::uv(double t) const {
+  return curve_(t);
+}
+
+double CurveOnSurface::speed(double t) const {
+  const CurveJet<2> c = evaluate(curve_, t);
+  const SurfaceJet s = evaluate(surface_, c.x.x(), c.x.y());
+  return (s.u * c.d1.x() + s.v * c.d1.y()).norm();
+}
+
+double CurveOnSurface::parameter(double fraction) const {
+  if (fraction <= 0) return t_.front();
+  if (fraction >= 1) return t_.back();
+  const double wanted = fraction * length();
+  const auto above = std::ranges::upper_bound(sum_, wanted);
+  const std::size_t k = std::clamp<std::size_t>(static_cast<std::size_t>(above - sum_.begin()), 1, t_.size() - 1);
+  double low = t_[k - 1], high = t_[k];
+  const auto gap = [&](double t) {
+    return sum_[k - 1] + gauss8([&](double s) { return speed(s); }, t_[k - 1], t) - wanted;
+  };
+  while (true) {
+    const double middle = low + (high - low) / 2;
+    if (middle <= low || middle >= high) return middle;
+    (gap(middle) < 0 ? low : high) = middle;
+  }
+}
+
+std::vector<double> CurveOnSurface::breaks(double from, double to) const {
+  const double t0 = parameter(from), t1 = parameter(to);
+  const double least = 1e-9 * (t1 - t0);
+  std::vector<double> result{t0};
+  for (const double t : t_) {
+    if (t > t0 + least && t < t1 - least) result.push_back(t);
+  }
+  result.push_back(t1);
+  return result;
+}
+
+namespace {
+
+struct Edge {
+  int direction = 0;  // 0: u = const
+  int end = 0;        // 0: min, 1: max
+};
+
+Interval domain_of(const NurbsSurface& s, int direction) {
+  return (direction == 0 ? s.u() : s.v()).domain();
+}
+
+double line_of(const NurbsSurface& s, const Edge& edge) {
+  const Interval d = domain_of(s, edge.direction);
+  return edge.end == 0 ? d.min : d.max;
+}
+
+// Does every control point of the curve lie on the line, so that the curve does?
+bool runs_along(const Curve2& curve, int direction, double line) {
+  return (curve.points().row(direction).array() == line).all();
+}
+
+// Do these curves cover the whole edge of the domain? Curves that don't run along it count for nothing.
+bool cover(const std::vector<const Curve2*>& curves, const Edge& edge, const NurbsSurface& surface) {
+  const Interval across = domain_of(surface, 1 - edge.direction);
+  std::vector<Interval> covered;
+  for (const Curve2* curve : curves) {
+    if (!runs_along(*curve, edge.direction, line_of(surface, edge))) continue;
+    const double a = curve->start()[1 - edge.direction], b = curve->end()[1 - edge.direction];
+    covered.push_back({std::min(a, b), std::max(a, b)});
+  }
+  std::ranges::sort(covered, {}, &Interval::min);
+  double reached = across.min;
+  for (const Interval& c : covered) {
+    if (c.min <= reached) reached = std::max(reached, c.max);
+  }
+  return reached >= across.max;
+}
+
+// Does the trim follow the whole edge of the domain?
+bool trim_follows(const TrimmedSurface& face, const Edge& edge) {
+  std::vector<const Curve2*> curves;
+  for (const TrimLoop& loop : face.loops) {
+    for (const TrimCurve& trim : loop.curves) curves.push_back(&trim.curve);
+  }
+  return cover(curves, edge, face.surface);
+}
+
+// Positions of the file's loop and curve numbers.
+struct CurvePosition {
+  int loop = 0, curve = 0;
+};
+
+// What is left of the file's curve, in its direction: reading cuts a curve where another loop meets it, and its pieces
+// keep its number and its parameters.
+std::vector<CurvePosition> find_curve(const Address& at, const PanelPlaces& panel, const std::string& who) {
+  const std::vector<TrimLoop>& loops = panel.face.loops;
+  const auto loop = std::ranges::find(loops, at.a, &TrimLoop::index);
+  if (loop == loops.end()) {
+    throw GeometryError(fmt::format("{}: panel '{}' has loops 0 to {}", who, panel.name, loops.size() - 1));
+  }
+  const std::vector<TrimCurve>& curves = loop->curves;
+  std::vector<CurvePosition> pieces;
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    if (curves[c].index == at.b) pieces.push_back({static_cast<int>(loop - loops.begin()), static_cast<int>(c)});
+  }
+  if (pieces.empty()) {
+    const int last = std::ranges::max(curves, {}, &TrimCurve::index).index;
+    throw GeometryError(fmt::format("{}: loop {} of panel '{}' has curves 0 to {}", who, at.a, panel.name, last));
+  }
+  const auto curve_at = [&](const CurvePosition& p) -> const TrimCurve& {
+    return curves[static_cast<std::size_t>(p.curve)];
+  };
+  if (curve_at(pieces.front()).reversed) std::ranges::reverse(pieces);
+  std::ranges::stable_sort(pieces, {}, [&](const CurvePosition& p) { return curve_at(p).curve.domain().min; });
+  return pieces;
+}
+
+// The part of a piece that an address names, as fractions of the piece's length.
+struct PathPart {
+  CurveOnSurface path;
+  double from = 0, to = 1;
+};
+
+std::vector<PathPart> path_of(const Address& at, const std::vector<CurvePosition>& pieces, const PanelPlaces& panel) {
+  std::vector<PathPart> parts;
+  double length = 0;
+  for (const CurvePosition& p : pieces) {
+    parts.push_back({CurveOnSurface(panel.face, panel.topology, p.loop, p.curve, panel.rest), at.from, at.to});
+    length += parts.back().path.length();
+  }
+  if (parts.size() == 1) return parts;
+  std::vector<PathPart> named;
+  double before = 0;
+  for (PathPart& part : parts) {
+    const double own = part.path.length();
+    part.from = std::max(0.0, (at.from * length - before) / own);
+    part.to = std::min(1.0, (at.to * length - before) / own);
+    before += own;
+    if (part.from < part.to) named.push_back(std::move(part));
+  }
+  return named;
+}
+
+// The edge of the domain that curves cover from end to end, if they do.
+std::optional<Edge> whole_edge(const std::vector<const Curve2*>& curves, const NurbsSurface& surface) {
+  for (int direction = 0; direction < 2; ++direction) {
+    for (int end = 0; end < 2; ++end) {
+      const Edge edge{direction, end};
+      const double line = line_of(surface, edge);
+      const bool along = std::ranges::all_of(curves, [&](const Curve2* c) { return runs_along(*c, direction, line); });
+      if (along && cover(curves, edge, surface)) return edge;
+    }
+  }
+  return std::nullopt;
+}
+
+Edge edge_of(const Address& at) {
+  return {at.a, at.b};
+}
+
+void require_edge(const Edge& edge, const PanelPlaces& panel, const std::string& who) {
+  if (trim_follows(panel.face, edge)) return;
+  throw GeometryError(
+      fmt::format("{}: edge {}{} of panel '{}' is trimmed away, wholly or in part; address a trim curve "
+                  "instead (curve:LOOP,K; `toile inspect FILE --svg` shows their numbers)",
+                  who, edge.direction == 0 ? 'u' : 'v', edge.end, panel.name));
+}
+
+void add_edge(const Edge& edge, bool clamp, const NurbsSurface& surface, std::vector<int>& out) {
+  const int n_u = surface.count_u(), n_v = surface.count_v();
+  const int across = edge.direction == 0 ? n_u : n_v, along = edge.direction == 0 ? n_v : n_u;
+  for (int row = 0; row < (clamp ? 2 : 1); ++row) {
+    const int fixed = edge.end == 0 ? row : across - 1 - row;
+    for (int k = 0; k < along; ++k) {
+      out.push_back(edge.direction == 0 ? surface.index(fixed, k) : surface.index(k, fixed));
+    }
+  }
+}
+
+[[noreturn]] void no_clamp(const std::string& who) {
+  throw InputError(
+      fmt::format("{}: clamp = true works at corner:, edge:, cp: and at curves that cover a whole edge of the "
+                  "domain in this version",
+                  who));
+}
+
+}  // namespace
+
+bool in_material(const TrimmedSurface& face, const TrimTopology& topology, const Eigen::Vector2d& uv) {
+  const Interval u = face.surface.u().domain(), v = face.surface.v().domain();
+  if (!u.contains(uv.x()) || !v.contains(uv.y())) return false;
+  if (contains(face, topology, uv)) return true;
+  const double near = 1e-9 * std::hypot(u.length(), v.length());
+  for (const TrimLoop& loop : face.loops) {
+    for (const TrimCurve& trim : loop.curves) {
+      if (closest_point<2>(trim.curve, uv).distance <= near) return true;
+    }
+  }
+  return false;
+}
+
+HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, const std::string& who) {
+  const NurbsSurface& surface = panel.rest;
+  const int n_u = surface.count_u(), n_v = surface.count_v();
+  HeldPlace held;
+  switch (at.kind) {
+    case Address::Kind::corner: {
+      const Eigen::Vector2d uv(at.a == 0 ? surface.u().domain().min : surface.u().domain().max,
+                               at.b == 0 ? surface.v().domain().min : surface.v().domain().max);
+      if (!contains(panel.face, panel.topology, uv)) {
+        throw GeometryError(
+            fmt::format("{}: corner ({}, {}) of panel '{}' is trimmed away; address the material instead "
+                        "(uv:U,V or curve:LOOP,K)",
+                        who, at.a, at.b, panel.name));
+      }
+      const int i = at.a == 0 ? 0 : n_u - 1, j = at.b == 0 ? 0 : n_v - 1;
+      held.control_points.push_back(surface.index(i, j));
+      if (clamp) {
+        const int i1 = at.a == 0 ? 1 : n_u - 2, j1 = at.b == 0 ? 1 : n_v - 2;
+        for (const int k : {surface.index(i1, j), surface.index(i, j1), surface.index(i1, j1)}) {
+          held.control_points.push_back(k);
+        }
+      }
+      break;
+    }
+    case Address::Kind::edge: {
+      require_edge(edge_of(at), panel, who);
+      add_edge(edge_of(at), clamp, surface, held.control_points);
+      break;
+    }
+    case Address::Kind::curve: {
+      const std::vector<CurvePosition> pieces = find_curve(at, panel, who);
+      std::vector<const Curve2*> curves;
+      for (const CurvePosition& p : pieces) {
+        const TrimLoop& loop = panel.face.loops[static_cast<std::size_t>(p.loop)];
+        curves.push_back(&loop.curves[static_cast<std::size_t>(p.curve)].curve);
+      }
+      const auto edge = whole_edge(curves, surface);
+      if (edge && at.from == 0 && at.to == 1) {
+        add_edge(*edge, clamp, surface, held.control_points);
+        break;
+      }
+      if (clamp) no_clamp(who);
+      held.every_point = false;
+      for (const PathPart& part : path_of(at, pieces, panel)) {
+        const std::vector<double> t = part.path.breaks(part.from, part.to);
+        for (std::size_t k = 0; k < t.size(); ++k) {
+          if (k > 0) held.points.push_back(part.path.uv((t[k - 1] + t[k]) / 2));
+          const Eigen::Vector2d uv = part.path.uv(t[k]);
+          if (held.points.empty() || held.points.back() != uv) held.points.push_back(uv);  // pieces share their ends
+        }
+      }
+      break;
+    }
+    case Address::Kind::uv: {
+      const Interval du = surface.u().domain(), dv = surface.v().domain();
+      if (!du.contains(at.uv.x()) || !dv.contains(at.uv.y())) {
+        throw GeometryError(fmt::format("{}: ({}, {}) lies outside panel '{}', whose domain is [{}, {}] x [{}, {}]",
+                                        who, at.uv.x(), at.uv.y(), panel.name, du.min, du.max, dv.min, dv.max));
+      }
+      if (!in_material(panel.face, panel.topology, at.uv)) {
+        throw GeometryError(
+            fmt::format("{}: ({}, {}) of panel '{}' is trimmed away", who, at.uv.x(), at.uv.y(), panel.name));
+      }
+      SurfaceBasis basis;
+      evaluate_basis(surface, at.uv.x(), at.uv.y(), basis);
+      for (int b = 0; b < basis.count_v; ++b) {
+        for (int a = 0; a < basis.count_u; ++a) {
+          if (basis.value[0][static_cast<std::size_t>(a + basis.count_u * b)] == 1) {
+            held.control_points.push_back(surface.index(basis.first_u + a, basis.first_v + b));
+          }
+        }
+      }
+      if (clamp) no_clamp(who);
+      if (held.control_points.empty()) held.points.push_back(at.uv);
+      break;
+    }
+    case Address::Kind::control_point: {
+      if (at.a >= n_u || at.b >= n_v) {
+        throw GeometryError(
+            fmt::format("{}: the net of panel '{}' is {} x {}, indices start from 0", who, panel.name, n_u, n_v));
+      }
+      if (!panel.carries_cloth[static_cast<std::size_t>(surface.index(at.a, at.b))]) {
+        throw GeometryError(
+            fmt::format("{}: control point ({}, {}) of panel '{}' carries no cloth", who, at.a, at.b, panel.name));
+      }
+      for (int j = std::max(0, at.b - (clamp ? 1 : 0)); j <= std::min(n_v - 1, at.b + (clamp ? 1 : 0)); ++j) {
+        for (int i = std::max(0, at.a - (clamp ? 1 : 0)); i <= std::min(n_u - 1, at.a + (clamp ? 1 : 0)); ++i) {
+          held.control_points.push_back(surface.index(i, j));
+        }
+      }
+      break;
+    }
+    case Address::Kind::box: {
+      if (clamp) no_clamp(who);
+      for (int k = 0; k < panel.start.cols(); ++k) {
+        const Eigen::Vector3d x = panel.start.col(k);
+        if (panel.carries_cloth[static_cast<std::size_t>(k)] && (x.array() >= at.min.array()).all() &&
+            (x.array() <= at.max.array()).all()) {
+          held.control_points.push_back(k);
+        }
+      }
+      if (held.control_points.empty()) {
+        throw GeometryError(fmt::format("{}: the box holds no control point of panel '{}'", who, panel.name));
+      }
+      break;
+    }
+  }
+  std::ranges::sort(held.control_points);
+  held.control_points.erase(std::unique(held.control_points.begin(), held.control_points.end()),
+                            held.control_points.end());
+  return held;
+}
+
+std::vector<LinePoint> line_points(const Address& along, const PanelPlaces& panel, const std::string& who) {
+  std::vector<LinePoint> points;
+  const auto integrate = [&](double t0, double t1, auto&& uv, auto&& speed) {
+    const double middle = t0 + (t1 - t0) / 2, half = (t1 - t0) / 2;
+    for (int side = -1; side <= 1; side += 2) {
+      for (std::size_t k = 0; k < gauss8_x.size(); ++k) {
+        const double t = middle + side * half * gauss8_x[k];
+        points.push_back({uv(t), gauss8_w[k] * half * speed(t)});
+      }
+    }
+  };
+  if (along.kind == Address::Kind::curve) {
+    for (const PathPart& part : path_of(along, find_curve(along, panel, who), panel)) {
+      const CurveOnSurface& path = part.path;
+      const std::vector<double> t = path.breaks(part.from, part.to);
+      for (std::size_t k = 1; k < t.size(); ++k) {
+        integrate(
+            t[k - 1], t[k], [&](double s) { return path.uv(s); }, [&](double s) { return path.speed(s); });
+      }
+    }
+    return points;
+  }
+  const Edge edge = edge_of(along);
+  require_edge(edge, panel, who);
+  const double line = line_of(panel.rest, edge);
+  const std::vector<double> t = (edge.direction == 0 ? panel.rest.v() : panel.rest.u()).breaks();
+  const auto uv = [&](double s) { return edge.direction == 0 ? Eigen::Vector2d(line, s) : Eigen::Vector2d(s, line); };
+  const auto speed = [&](double s) {
+    const SurfaceJet jet = evaluate(panel.rest, uv(s).x(), uv(s).y());
+    return (edge.direction == 0 ? jet.v : jet.u).norm();
+  };
+  for (std::size_t k = 1; k < t.size(); ++k) integrate(t[k - 1], t[k], uv, speed);
+  return points;
+}
+
+}  // namespace toile

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where an address lies on a built panel.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "geometry/trimmed_surface.h"
+#include "pipeline/scene/addresses.h"
+#include "trimming/topology.h"
+
+namespace toile {
+
+// A trim curve laid on a surface, measured by arc length in space. Pieces end where the curve meets knot lines, so that
+// what is integrated over a piece is smooth.
+class CurveOnSurface {
+ public:
+  // `curve` of `face` (positions, not the file's numbers) on `surface`, which has face's parameters.
+  CurveOnSurface(const TrimmedSurface& face, const TrimTopology& topology, int loop, int curve,
+                 const NurbsSurface& surface);
+
+  double length() const { return sum_.back(); }
+  double parameter(double fraction) const;  // of the curve at a fraction of the length
+  Eigen::Vector2d uv(double t) const;
+  double speed(double t) const;  // |dx/dt|
+  // Ends of smooth pieces within [from, to] (fractions), both included, ascending.
+  std::vector<double> breaks(double from, double to) const;
+
+ private:
+  const Curve2& curve_;
+  const NurbsSurface& surface_;
+  std::vector<double> t_, sum_;  // piece ends and the length up to each
+};
+
+// Points on a curve or edge with their share of its length: integrates a line load.
+struct LinePoint {
+  Eigen::Vector2d uv;
+  double weight = 0;  // m
+};
+
+// What a pin holds: control points (exactly), or material points, of which rows are chosen by rank.
+struct HeldPlace {
+  std::vector<int> control_points;      // of the panel's net, ascending
+  std::vector<Eigen::Vector2d> points;  // parameters
+  bool every_point = true;              // false: as many of `points` as are independent (a curve)
+};
+
+// A panel as addresses see it.
+struct PanelPlaces {
+  const std::string& name;
+  const TrimmedSurface& face;
+  const TrimTopology& topology;
+  const NurbsSurface& rest;       // SI
+  const Eigen::Matrix3Xd& start;  // net, SI, scene axes
+  const std::vector<bool>& carries_cloth;
+};
+
+// Is the point in the material, or on its border within 1e-9 of the domain's size? Corners of trims are rarely doubles.
+bool in_material(const TrimmedSurface& face, const TrimTopology& topology, const Eigen::Vector2d& uv);
+
+// `who` starts the messages: "scene.toml:12: pin 0 (corner:0,0)". Throws GeometryError where the place is trimmed away,
+// outside the panel or doesn't exist; InputError for a clamp that this place can't have.
+HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, const std::string& who);
+std::vector<LinePoint> line_points(const Address& along, const PanelPlaces& panel, const std::string& who);
+
+}  // namespace toile

@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pipeline/build/system.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <numeric>
+
+#include "analysis/constraint/select_rows.h"
+#include "analysis/projection/fast_projection.h"
+#include "analysis/projection/lagrange_newton.h"
+#include "geometry/error.h"
+#include "pipeline/build/pin_reach.h"
+#include "pipeline/build/places.h"
+
+namespace toile {
+namespace {
+
+// Rows of a curve pin depend on each other; below this part of a row's own size it adds nothing that others don't hold.
+constexpr double smallest_place_pivot = 1e-3;
+
+ScalarRow row_at(const Build& build, int panel, const Eigen::Vector2d& uv) {
+  const NurbsSurface& rest = build.rest(panel);
+  const int first = build.model->first_control_point(panel);
+  SurfaceBasis basis;
+  evaluate_basis(rest, uv.x(), uv.y(), basis);
+  ScalarRow row;
+  for (int b = 0; b < basis.count_v; ++b) {
+    for (int a = 0; a < basis.count_u; ++a) {
+      const double value = basis.value[0][static_cast<std::size_t>(a + basis.count_u * b)];
+      if (value == 0) continue;
+      row.index.push_back(first + rest.index(basis.first_u + a, basis.first_v + b));
+      row.value.push_back(value);
+    }
+  }
+  return row;
+}
+
+// What is held on one side of a seam is held on the other.
+std::vector<int> on_both_sides(const std::vector<int>& control_points, const std::vector<int>& leader) {
+  std::vector<bool> held(leader.size(), false);
+  for (const int i : control_points) held[static_cast<std::size_t>(leader[static_cast<std::size_t>(i)])] = true;
+  std::vector<int> result;
+  for (std::size_t k = 0; k < leader.size(); ++k) {
+    if (held[static_cast<std::size_t>(leader[k])]) result.push_back(static_cast<int>(k));
+  }
+  return result;
+}
+
+struct Candidate {
+  ScalarRow row;
+  int pin = 0;
+  bool required = false;
+};
+
+// Which candidates are independent of those before them and of the fixed control points: sparse Cholesky of the rows'
+// inertia N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one
+// left.
+std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
+                              const Eigen::VectorXd& mass) {
+  const int n = static_cast<int>(candidates.size());
+  if (n == 0 || mass.size() == 0) return std::vector<bool>(candidates.size(), false);  // no place, or nothing left free
+  Eigen::SparseMatrix<double, Eigen::RowMajor> rows(n, map.control_points());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int k = 0; k < n; ++k) {
+    const ScalarRow& row = candidates[static_cast<std::size_t>(k)].row;
+    for (std::size_t a = 0; a < row.index.size(); ++a) entries.emplace_back(k, row.index[a], row.value[a]);
+  }
+  rows.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> reduced = rows * map.free_part();
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> weighted = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> products =
+      weighted * Eigen::SparseMatrix<double>(weighted.transpose());
+  // Row k of the Gram matrix by column; a place meets few others, and so do the rests that the factorisation leaves.
+  std::vector<std::map<int, double>> gram(candidates.size());
+  Eigen::VectorXd left(n);
+  // A row that touches fixed control points only holds nothing new.
+  for (int k = 0; k < n; ++k) left[k] = std::sqrt(products.coeff(k, k)) > 1e-9 / std::sqrt(mass.maxCoeff()) ? 1 : 0;
+  for (int k = 0; k < n; ++k) {
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(products, k); it; ++it) {
+      const int l = static_cast<int>(it.col());
+      if (l == k || left[k] == 0 || left[l] == 0) continue;
+      gram[static_cast<std::size_t>(k)][l] = it.value() / std::sqrt(products.coeff(k, k) * products.coeff(l, l));
+    }
+  }
+  std::vector<bool> taken(candidates.size(), false);
+  for (bool required : {true, false}) {
+    while (true) {
+      int best = -1;
+      for (int k = 0; k < n; ++k) {
+        const auto& c = candidates[static_cast<std::size_t>(k)];
+        if (taken[static_cast<std::size_t>(k)] || c.required != required || left[k] < smallest_place_pivot) continue;
+        if (best < 0 || (!required && left[k] > left[best] * (1 + 1e-9))) best = k;
+      }
+      if (best < 0) break;
+      taken[static_cast<std::size_t>(best)] = true;
+      const std::map<int, double> pivot = std::move(gram[static_cast<std::size_t>(best)]);
+      for (const auto& [k, at_k] : pivot) {
+        auto& row = gram[static_cast<std::size_t>(k)];
+        row.erase(best);
+        left[k] -= at_k * at_k / left[best];
+        for (const auto& [l, at_l] : pivot) {
+          if (l != k) row[l] -= at_k * at_l / left[best];
+        }
+      }
+    }
+  }
+  return taken;
+}
+
+// A point that others hold already adds nothing, so it is left out: a warning, unless one of them moves.
+std::string held_twice(const Scene& scene, const std::vector<Candidate>& candidates, const std::vector<bool>& taken,
+                       std::size_t k, const Eigen::VectorXd& start) {
+  const ScenePin& pin = scene.pins[static_cast<std::size_t>(candidates[k].pin)];
+  const Eigen::Vector3d at = apply(candidates[k].row, start);
+  const ScenePin* other = nullptr;  // of the nearest place
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t l = 0; l < candidates.size(); ++l) {
+    const double distance = (apply(candidates[l].row, start) - at).norm();
+    if (!taken[l] || candidates[l].pin == candidates[k].pin || !(distance < nearest)) continue;
+    nearest = distance;
+    other = &scene.pins[static_cast<std::size_t>(candidates[l].pin)];
+  }
+  const std::string what =
+      other ? fmt::format("{}: {} and {} ({}), {:.3g} m away, hold the same control points", pin.where, pin.at.text,
+                          other->at.text, other->where, nearest)
+            : fmt::format("{}: {} is held by pins of control points already", pin.where, pin.at.text);
+  if (pin.move || (other && other->move)) throw InputError(what + " and one of them moves");
+  return what + "; the first one is left out";
+}
+
+}  // namespace
+
+double extent(const ShellPanel& panel) {
+  Eigen::Matrix3Xd places(3, panel.quadrature.points.size());
+  for (Eigen::Index k = 0; k < places.cols(); ++k) {
+    const Eigen::Vector2d& uv = panel.quadrature.points[static_cast<std::size_t>(k)];
+    places.col(k) = panel.rest(uv.x(), uv.y());
+  }
+  const Eigen::Vector3d middle = places.rowwise().mean();
+  return std::numbers::sqrt2 * (places.colwise() - middle).colwise().norm().maxCoeff();
+}
+
+double limit_stiffness(const Build& build, int panel) {
+  return build.scene.strain_limit.stiffness.value_or(default_limit_stiffness(build, panel));
+}
+
+double default_limit_stiffness(const Build& build, int panel) {
+  const Scene& scene = build.scene;
+  const StrainLimit& limit = scene.strain_limit;
+  constexpr double reserve = 10;
+  const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+  double load = shell.fabric.density * scene.gravity.norm() * extent(shell);
+  for (const SceneTraction& traction : scene.tractions) load = std::max(load, traction.force.norm());
+  const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
+  const double own = std::max(shell.fabric.membrane.weft, shell.fabric.membrane.warp);
+  return reserve * std::max({load / narrowest, own, shell.fabric.density});
+}
+
+std::unique_ptr<System> assemble(const Build& build, double t) {
+  const Scene& scene = build.scene;
+  auto system = std::make_unique<System>();
+
+  // What each pin holds.
+  struct Held {
+    int control_point;
+    int pin;
+  };
+  std::vector<Held> held;
+  std::vector<Candidate> candidates;
+  std::vector<Eigen::Vector3d> mean(scene.pins.size(), Eigen::Vector3d::Zero());
+  for (std::size_t p = 0; p < scene.pins.size(); ++p) {
+    const ScenePin& pin = scene.pins[p];
+    if (pin.release && *pin.release <= t) continue;
+    const int k = build.panel(pin.panel);
+    const BuiltPanel& panel = build.panels[static_cast<std::size_t>(k)];
+    const Eigen::Matrix3Xd start = build.net(k, build.start);
+    const std::string who = fmt::format("{}: pin {} ({})", pin.where, p, pin.at.text);
+    const PanelPlaces places{panel.name, panel.face, panel.topology, build.rest(k), start, panel.carries_cloth};
+    const HeldPlace place = held_place(pin.at, pin.clamp, places, who);
+    int points = 0;
+    const auto count = [&](int i) {
+      mean[p] += start.col(i);
+      ++points;
+    };
+    std::vector<int> followers;
+    for (const int i : on_both_sides(place.control_points, panel.leader)) {
+      const bool leads = panel.leader[static_cast<std::size_t>(i)] == i;
+      if (panel.smooth_seams.follows(build.rest(k), i)) {
+        if (leads) followers.push_back(i);
+        continue;
+      }
+      held.push_back({build.model->first_control_point(k) + i, static_cast<int>(p)});
+      if (leads) count(i);  // a seam's place counts once
+    }
+    // Fixed by itself a point of a smooth seam would no longer follow its neighbours, and the seam could fold there.
+    for (const int i : followers) {
+      candidates.push_back({{{build.model->first_control_point(k) + i}, {1.0}}, static_cast<int>(p), true});
+    }
+    if (points == 0) std::ranges::for_each(followers, count);
+    for (const Eigen::Vector2d& uv : place.points) {
+      candidates.push_back({row_at(build, k, uv), static_cast<int>(p), place.every_point});
+      mean[p] += apply(candidates.back().row, build.start);
+      ++points;
+    }
+    mean[p] /= points;
+  }
+  std::ranges::stable_sort(held, {}, &Held::control_point);
+  std::vector<Held> fixed;
+  for (const Held& h : held) {
+    if (!fixed.empty() && fixed.back().control_point == h.control_point) {
+      const ScenePin& a = scene.pins[static_cast<std::size_t>(fixed.back().pin)];
+      const ScenePin& b = scene.pins[static_cast<std::size_t>(h.pin)];
+      if (a.move || b.move) {
+        throw InputError(fmt::format("{}: pins {} ({}) and {} ({}) hold the same control point and one of them moves",
+                                     b.where, fixed.back().pin, a.at.text, h.pin, b.at.text));
+      }
+      continue;
+    }
+    fixed.push_back(h);
+  }
+
+  const MovedPoint moved = [&scene, mean](int pin, const Eigen::Vector3d& from, double time) -> Eigen::Vector3d {
+    const auto& move = scene.pins[static_cast<std::size_t>(pin)].move;
+    return move ? (*move)(from, mean[static_cast<std::size_t>(pin)], time) : from;
+  };
+  refuse_out_of_reach(build, t, moved);
+
+  std::vector<int> control_points;
+  std::vector<Eigen::Vector3d> places;
+  for (const Held& h : fixed) {
+    control_points.push_back(h.control_point);
+    places.push_back(build.start.segment<3>(3 * h.control_point));
+    system->fixed_pin.push_back(h.pin);
+  }
+  system->map = std::make_unique<AffineMap>(build.dependence, control_points,
+                                            [moved, places, pins = system->fixed_pin](std::size_t i, double time) {
+                                              return moved(pins[i], places[i], time);
+                                            });
+
+  DynamicSystem& dynamic = system->dynamic;
+  dynamic.model = build.model.get();
+  dynamic.map = system->map.get();
+  dynamic.loads = build.loads;
+  dynamic.node_mass = system->map->reduce_scalar(build.model->lumped_mass());
+  dynamic.node_drag = system->map->reduce_scalar(build.model->lumped_drag());
+  const auto& nodes = system->map->node_control_point();
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    double& mass = dynamic.node_mass[static_cast<Eigen::Index>(k)];
+    mass = std::max(mass, build.mass_floor[nodes[k]]);
+    double& drag = dynamic.node_drag[static_cast<Eigen::Index>(k)];
+    drag = scene.rest ? 0 : std::max(drag, 0.0);
+  }
+
+  ConstraintRows rows;
+  const std::vector<bool> taken = independent(candidates, *system->map, dynamic.node_mass);
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    Candidate& c = candidates[k];
+    const Eigen::Vector3d from = apply(c.row, build.start);
+    const bool point = scene.pins[static_cast<std::size_t>(c.pin)].at.kind == Address::Kind::uv;
+    if (!taken[k] && point) system->warnings.push_back(held_twice(scene, candidates, taken, k, build.start));
+    if (!taken[k]) continue;
+    const int pin = c.pin;
+    rows.place.push_back({c.row, pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
+    system->place_pin.push_back(pin);
+  }
+  for (const BuiltPanel& panel : build.panels) {
+    system->points.push_back(panel.points);
+    system->points.back().insert(system->points.back().end(), panel.extra_points.begin(), panel.extra_points.end());
+  }
+  const StrainLimit& limit = scene.strain_limit;
+  if (limit.on) {
+    std::vector<StrainRow> means;
+    for (const BuiltPanel& panel : build.panels)
+      means.insert(means.end(), panel.mean_rows.begin(), panel.mean_rows.end());
+    rows.strain = select_rows(*build.model, *system->map, system->points, rows.place, means);
+    if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::second_order) {
+      std::vector<double> stiffness, rate;
+      for (std::size_t k = 0; k < build.panels.size(); ++k) {
+        const ShellPanel& panel = build.model->panels()[k];
+        stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
+        // Slow vibrations of the limit lose in a step what waves cross of the panel and back: with half of it example
+        // 4.1(a) gains 6e-5 of the work of gravity at 4 ms, with all of it nothing.
+        rate.push_back(2 * std::sqrt(stiffness.back() / panel.fabric.density) / extent(panel));
+      }
+      for (StrainRow& row : rows.strain) {
+        row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
+        row.damping_rate = rate[static_cast<std::size_t>(row.panel)];
+      }
+    }
+  }
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const auto listed = static_cast<std::ptrdiff_t>(build.panels[k].points.size());
+    system->extra_points.emplace_back(system->points[k].begin() + listed, system->points[k].end());
+    system->points[k].resize(static_cast<std::size_t>(listed));
+  }
+  system->strain_rows = static_cast<int>(rows.strain.size());
+  system->place_rows = static_cast<int>(rows.place.size());
+  if (!rows.strain.empty() || !rows.place.empty()) {
+    ProjectionOptions options;
+    options.variant = limit.variant;
+    options.weft = limit.weft;
+    options.warp = limit.warp;
+    options.tolerance = limit.tolerance;
+    options.regularisation = limit.regularisation;
+    options.max_iterations = limit.max_iterations;
+    if (limit.solver == LimitSolver::lagrange)
+      system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
+    else
+      system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
+    system->projection->use_threads(build.model->workers());
+  }
+  dynamic.projection = system->projection.get();
+  return system;
+}
+
+Eigen::VectorXd control_points(const System& system, const DynamicState& state) {
+  Eigen::VectorXd q(3 * system.map->control_points());
+  system.map->expand(state.x, state.t, q);
+  return q;
+}
+
+Eigen::VectorXd control_point_velocity(const System& system, const DynamicState& state) {
+  // q = T x + g(t): T v by expanding a step of x, g' by a central difference of the motion, which is smooth.
+  constexpr double h = 1e-5;
+  Eigen::VectorXd later(3 * system.map->control_points()), earlier(later.size());
+  system.map->expand(state.v, state.t, later);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(state.v.size());
+  system.map->expand(zero, state.t, earlier);
+  Eigen::VectorXd velocity = later - earlier;
+  system.map->expand(zero, state.t + h, later);
+  system.map->expand(zero, state.t - h, earlier);
+  velocity += (later - earlier) / (2 * h);
+  return velocity;
+}
+
+DynamicState state_from(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double t) {
+  DynamicState state;
+  state.t = t;
+  state.x = system.map->restrict(q);
+  state.v = system.map->restrict(v);
+  initialise(system.dynamic, state);
+  return state;
+}
+
+}  // namespace toile

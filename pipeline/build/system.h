@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The system that the step loop advances: a build with the pins that hold at some time.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/build/build.h"
+
+namespace toile {
+
+// Pins, projection, masses. `dynamic` points into the rest, so a System stays where it is made.
+struct System {
+  System() = default;
+  System(const System&) = delete;
+
+  std::vector<int> fixed_pin;  // pin of each fixed control point, in map order
+  // Per panel: which the projection takes, and why not. Those that the panel lists, and those of the sampling rule and
+  // of pins besides; a StrainRow's `point` counts through the first, then the second.
+  std::vector<std::vector<ConstraintPoint>> points, extra_points;
+  std::vector<std::string> warnings;  // pins that hold what others hold
+  int strain_rows = 0, place_rows = 0;
+  std::vector<int> place_pin;  // pin of each place row
+  std::unique_ptr<AffineMap> map;
+  std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
+  DynamicSystem dynamic;
+};
+
+// Edge of the square whose corners are as far from its middle as the farthest cloth is [m].
+double extent(const ShellPanel& panel);
+
+// Stiffness of the strain limit of a panel [N/m]: the scene's, else one that strains by a tenth of the narrowest limit
+// under the panel's whole weight or the largest traction, and is at least ten times the fabric's own.
+double limit_stiffness(const Build& build, int panel);
+double default_limit_stiffness(const Build& build, int panel);
+
+// Pins released at or before t are left out. Throws InputError where two pins hold one control point and move apart,
+// or farther than the cloth between them reaches, GeometryError for places that don't exist, SolverError where place
+// rows contradict each other.
+std::unique_ptr<System> assemble(const Build& build, double t);
+
+// State that continues control points q with velocities v (3 n each) under this system at time t.
+DynamicState state_from(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double t);
+
+// Velocities of all control points [m/s], those of moved pins included.
+Eigen::VectorXd control_point_velocity(const System& system, const DynamicState& state);
+Eigen::VectorXd control_points(const System& system, const DynamicState& state);
+
+}  // namespace toile

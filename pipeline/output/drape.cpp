@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pipeline/output/drape.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "geometry/clock.h"
+#include "geometry/error.h"
+#include "io/file.h"
+#include "pipeline/base/exit_code.h"
+#include "pipeline/base/interrupt.h"
+#include "pipeline/base/json_text.h"
+#include "pipeline/base/version.h"
+#include "pipeline/build/build.h"
+#include "pipeline/output/history.h"
+#include "pipeline/output/output.h"
+#include "pipeline/output/summary.h"
+#include "pipeline/run/checkpoint.h"
+#include "pipeline/run/run.h"
+
+namespace toile {
+namespace {
+
+// Of wall time between checkpoints; the promise is two seconds.
+constexpr double checkpoint_seconds = 1;
+
+int exit_code(RunExit exit) {
+  switch (exit) {
+    case RunExit::ok:
+      return exit_ok;
+    case RunExit::solver_failed:
+      return exit_solver;
+    case RunExit::check_failed:
+      return exit_check;
+    case RunExit::interrupted:
+      return exit_interrupted;
+    case RunExit::time_limit:
+      return exit_time_limit;
+  }
+  return exit_internal;
+}
+
+std::string describe(const Build& build, std::size_t k) {
+  const BuiltPanel& panel = build.panels[k];
+  const NurbsSurface& s = panel.face.surface;
+  const auto cells = [&](CellKind kind) { return std::ranges::count(panel.topology.cells, kind); };
+  return fmt::format(
+      "panel '{}': degree {} x {}, {} x {} control points, {} whole and {} cut cells, {} constraint points, "
+      "{} control points extended",
+      panel.name, s.u().degree(), s.v().degree(), s.count_u(), s.count_v(), cells(CellKind::inside),
+      cells(CellKind::cut), panel.points.size(), panel.extended.size());
+}
+
+// Reasons of constraint points that the projection leaves out, with their number.
+std::map<std::string, int> unused(const System& system) {
+  std::map<std::string, int> reasons;
+  for (const auto& panel : system.points) {
+    for (const ConstraintPoint& point : panel) {
+      if (!point.used) ++reasons[point.why];
+    }
+  }
+  return reasons;
+}
+
+// What the scene names and no part of this version simulates: a drape without it would be another one, so it is
+// refused.
+std::vector<std::string> not_simulated(const Scene& scene) {
+  std::vector<std::string> out;
+  const auto add = [&](const auto& tables, const char* key, const char* words) {
+    if (tables.empty()) return;
+    out.push_back(
+        fmt::format("{}: {} are not simulated by this version; drape without the {} [[{}]] table{} with "
+                    "--set '{}=[]'",
+                    tables.front().where, words, tables.size(), key, tables.size() == 1 ? "" : "s", key));
+  };
+  add(scene.seams, "seam", "seams");
+  add(scene.obstacles, "obstacle", "obstacles");
+  return out;
+}
+
+void refuse_not_simulated(const Scene& scene) {
+  const std::vector<std::string> reasons = not_simulated(scene);
+  if (!reasons.empty()) throw InputError(fmt::format("{}", fmt::join(reasons, "\n")));
+}
+
+// "42 s", "3 min", "2.5 h".
+std::string duration(double seconds) {
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+bool holds(const std::filesystem::path& directory, const std::filesystem::path& file) {
+  std::error_code error;
+  return std::filesystem::equivalent(directory, std::filesystem::absolute(file).parent_path(), error);
+}
+
+}  // namespace
+
+int drape(Scene scene, const DrapeOptions& options, Console& console) {
+  const Clock::time_point called = Clock::now();
+  refuse_not_simulated(scene);
+  const std::filesystem::path directory = options.directory.value_or(std::filesystem::path("out") / scene.name);
+  const Build built = build(std::move(scene));
+  built.model->use_threads(options.threads);
+  for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& note : built.notes) console.detail(note);
+  for (const std::string& note : built.scene.notes) console.note(note);
+  for (std::size_t k = 0; k < built.panels.size(); ++k) console.detail(describe(built, k));
+  // What can be refused is refused before anything is written.
+  RunResult result;
+  std::unique_ptr<System> start_system;
+  if (options.resume) {
+    result = read_checkpoint(*options.resume, built);
+    require_time_left(built, result);
+  } else {
+    start_system = assemble(built, 0);
+  }
+  const bool goes_on = options.resume && holds(directory, *options.resume);
+  if (!goes_on) prepare_directory(directory, options.overwrite);
+
+  std::ofstream log(directory / "run.log", goes_on ? std::ios::app : std::ios::trunc);
+  log << "toile " << version() << "\nscene " << built.scene.path.string() << "\n";
+  if (options.resume) log << fmt::format("resumed from {} at t = {:.6f} s\n", options.resume->string(), result.state.t);
+  for (std::size_t k = 0; k < built.panels.size(); ++k) log << describe(built, k) << "\n";
+  const bool twist_free =
+      std::ranges::all_of(built.scene.panels, [](const ScenePanel& p) { return p.fabric.bending.twist == 0; });
+  if (twist_free) log << "twist stiffness is 0, as in the paper's bending law\n";
+  for (const std::string& warning : built.warnings) log << "warning: " << warning << "\n";
+  for (const std::string& note : built.notes) log << note << "\n";
+
+  FrameWriter writer(built, directory, result.frame_times);
+  const std::filesystem::path former =
+      options.resume ? std::filesystem::absolute(*options.resume).parent_path() / "history.csv" : "";
+  History history(built, directory / "history.csv", former, result);
+  const SceneMark mark = scene_mark(built);
+  const Clock::time_point start = Clock::now();
+  Clock::time_point saved = start;
+  const double start_time = result.state.t;
+  const auto save = [&](const RunState& state, const System& system) {
+    write_file(directory / "checkpoint", format_checkpoint(mark, state, system));
+    saved = Clock::now();
+  };
+  const InterruptGuard guard;
+  RunHooks hooks;
+  hooks.stop = [&] {
+    if (guard.asked()) return RunExit::interrupted;
+    const auto& limit = built.scene.time_limit;
+    return limit && since(called) >= *limit ? RunExit::time_limit : RunExit::ok;
+  };
+  hooks.resumable = [&](const RunResult& now) {
+    history.add(now);
+    if (now.steps == 0 || since(saved) >= checkpoint_seconds) save(now, *now.system);
+  };
+  hooks.frame = [&](const RunFrame& frame) {
+    writer.write(frame);
+    log << fmt::format("frame {:4}  t = {:.6f} s  {:.2f} s of wall time\n", frame.number, frame.time, since(start))
+        << std::flush;
+  };
+  hooks.progress = [&](const RunProgress& p) {
+    if (built.scene.rest) {
+      console.live(fmt::format("until rest: t = {:.3f} s  step {} of {:.2g} s", p.time, p.steps, p.dt));
+      return;
+    }
+    const double gone = p.time - start_time;
+    console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {} left", 100 * p.time / p.until,
+                             p.time, p.until, p.steps, p.dt, duration(since(start) * (p.until - p.time) / gone)));
+  };
+  result = result.system ? run(built, std::move(result), hooks) : run(built, std::move(start_system), hooks);
+  console.end_live();
+  for (const std::string& warning : result.warnings) console.warning(warning);
+  if (result.accepted) {
+    save(*result.accepted, *result.system);
+  } else {
+    save(result, *result.system);
+  }
+
+  const Clock::time_point writing = Clock::now();
+  const Eigen::VectorXd q = control_points(*result.system, result.state);
+  write_file(directory / "draped.igs", draped_file(built, q).text);
+  if (built.scene.preview) {
+    // A picture is a courtesy: its failure doesn't spoil the run.
+    try {
+      const std::string png = writer.preview(*result.system, q);
+      if (!png.empty()) write_file(directory / "preview.png", png);
+    } catch (const Error& error) {
+      result.warnings.push_back(fmt::format("preview.png was not drawn: {}", error.what()));
+      console.warning(result.warnings.back());
+    }
+  }
+  if (result.unconverged_steps > 0) {
+    result.warnings.push_back(
+        fmt::format("{} of {} steps did not meet the strain limit or the pins within {} iterations",
+                    result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
+    console.warning(result.warnings.back());
+  }
+  // The forces of a refused step are not those of the state that it started from.
+  const double forces_of = result.exit == RunExit::solver_failed ? 0 : result.dt_last;
+  const StateMeasures measures = measure(built, *result.system, result.state, forces_of);
+  if (const std::string between = strained_between_points(built, measures); !between.empty()) {
+    result.warnings.push_back(between);
+    console.warning(between);
+  }
+  const std::string report = json_text(report_json(built, result, measures, since(writing))) + "\n";
+  write_file(directory / "report.json", report);
+  log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time, files included\n",
+                     name(result.exit), result.steps, result.redone_steps, result.dt_min, result.dt_max, since(called));
+  if (!result.reason.empty()) log << result.reason << "\n";
+  if (!log.flush()) throw OutputError((directory / "run.log").string() + ": not everything could be written");
+
+  for (const std::string& line : summary(built, result, measures, since(called))) console.note(line);
+  console.note(fmt::format("wrote {}; open", directory.string()));
+  for (const std::string& line : results_to_open(directory, built.scene.name)) console.note(line);
+  if (options.json) std::fputs(report.c_str(), stdout);
+  if (result.exit == RunExit::ok) return exit_ok;
+  console.error(result.reason);
+  const bool stopped = result.exit == RunExit::interrupted || result.exit == RunExit::time_limit;
+  if (stopped && !options.command.empty()) {
+    console.note("to go on from here:\n  " + resume_command(options.command, directory));
+  }
+  return exit_code(result.exit);
+}
+
+int dry_run(Scene scene, bool json, Console& console) {
+  refuse_not_simulated(scene);
+  const Build built = build(std::move(scene));
+  for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& note : built.scene.notes) console.note(note);
+  std::unique_ptr<System> system = assemble(built, 0);
+  TimeStepBound bound = time_step_bound(*built.model, *system->map, system->dynamic.node_mass, built.start);
+  const double dt = planned_step(built.scene, bound);
+  long long steps = 0;
+  std::vector<double> times;  // of a run until rest nobody knows
+  if (!built.scene.rest) times = frame_times(built.scene);
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    steps += static_cast<long long>(std::ceil((times[k] - times[k - 1]) / dt * (1 - 1e-9)));
+  }
+  // A few steps, timed, on a copy of the start.
+  DynamicState state = state_from(*system, built.start, Eigen::VectorXd::Zero(built.start.size()), 0);
+  const int trial = built.scene.rest ? 5 : static_cast<int>(std::min(5LL, steps));
+  const Clock::time_point start = Clock::now();
+  StepWork work;
+  for (int k = 0; k < trial; ++k) step(system->dynamic, state, dt, work);
+  const double per_step = trial > 0 ? since(start) / trial : 0;
+  const std::size_t factor = system->projection ? system->projection->factor_nonzeros() : 0;
+  const double bytes =
+      static_cast<double>(built.model->table_bytes() + 8 * factor) + 8.0 * 30 * static_cast<double>(built.start.size());
+  const std::map<std::string, int> reasons = unused(*system);
+  if (json) {
+    nlohmann::ordered_json out;
+    out["scene"] = built.scene.name;
+    out["dt"] = dt;
+    out["dt_bound"] = bound.dt;
+    out["limited_by"] = {{"panel", built.panels[static_cast<std::size_t>(bound.cell.panel)].name},
+                         {"cell", {bound.cell.i, bound.cell.j}},
+                         {"stiffness", bound.bending ? "bending" : "membrane"}};
+    if (!built.scene.rest) {
+      out["steps"] = steps;
+      out["frames"] = times.size();
+      out["estimated_seconds"] = per_step * static_cast<double>(steps);
+    }
+    out["seconds_per_step"] = per_step;
+    out["estimated_bytes"] = bytes;
+    out["control_points"] = built.model->control_point_count();
+    out["degrees_of_freedom"] = 3 * system->map->nodes();
+    out["strain_rows"] = system->strain_rows;
+    out["pin_rows"] = 3 * system->place_rows;
+    out["unused_points"] = reasons;
+    out["warnings"] = built.warnings;
+    fmt::print("{}\n", json_text(out));
+    return exit_ok;
+  }
+  fmt::print("step       {:.4g} s{}\n", dt, built.scene.dt ? " (as the scene says)" : "");
+  fmt::print("limited by {} in {}: stable below {:.4g} s\n", bound.bending ? "bending" : "membrane stiffness",
+             describe_cell(built, bound.cell), bound.dt);
+  if (built.scene.rest) {
+    fmt::print("steps      until no point would move by more than {:.3g} m if released, {} at most\n",
+               rest_tolerance(built), built.scene.rest->max_steps);
+    fmt::print("time       about {:.2g} s a step, without frames\n", per_step);
+  } else {
+    fmt::print("steps      {} for {} frames up to {} s\n", steps, times.size(), built.scene.until);
+    fmt::print("time       about {:.2g} s, without frames\n", per_step * static_cast<double>(steps));
+  }
+  fmt::print("memory     about {:.2g} MB\n", bytes / 1e6);
+  fmt::print("unknowns   {} of {} control points\n", 3 * system->map->nodes(), built.model->control_point_count());
+  fmt::print("rows       {} of strain, {} of pins\n", system->strain_rows, 3 * system->place_rows);
+  for (const auto& [why, count] : reasons) fmt::print("unused     {} constraint points: {}\n", count, why);
+  return exit_ok;
+}
+
+int check_scene(Scene scene, bool json, Console& console) {
+  const Build built = build(std::move(scene));
+  const std::unique_ptr<System> system = assemble(built, 0);
+  const std::vector<std::string> idle = not_simulated(built.scene);
+  if (json) {
+    nlohmann::ordered_json out;
+    out["scene"] = built.scene.name;
+    out["valid"] = idle.empty();
+    out["panels"] = nlohmann::ordered_json::array();
+    for (const BuiltPanel& panel : built.panels) {
+      out["panels"].push_back({{"name", panel.name},
+                               {"control_points", {panel.face.surface.count_u(), panel.face.surface.count_v()}},
+                               {"constraint_points", panel.points.size()}});
+    }
+    out["warnings"] = built.warnings;
+    out["notes"] = built.notes;
+    out["not_simulated"] = idle;
+    fmt::print("{}\n", json_text(out));
+    return idle.empty() ? exit_ok : exit_input;
+  }
+  for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& note : built.notes) console.detail(note);
+  for (std::size_t k = 0; k < built.panels.size(); ++k) fmt::print("{}\n", describe(built, k));
+  // What `drape` refuses isn't valid.
+  for (const std::string& reason : idle) console.error(reason);
+  if (!idle.empty()) return exit_input;
+  fmt::print("{}: valid\n", built.scene.path.string());
+  return exit_ok;
+}
+
+}  // namespace toile

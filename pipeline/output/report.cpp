@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/base/version.h"
+#include "pipeline/output/output.h"
+
+namespace toile {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json array(const Eigen::Ref<const Eigen::VectorXd>& x) {
+  Json result = Json::array();
+  for (const double value : x) result.push_back(value);
+  return result;
+}
+
+Json stress(const Extremes& e) {
+  return {{"min_weft", e.min[0]}, {"max_weft", e.max[0]}, {"mean_weft", e.mean[0]},
+          {"min_warp", e.min[1]}, {"max_warp", e.max[1]}, {"mean_warp", e.mean[1]}};
+}
+
+Json measured(double value, const char* unit) {
+  return {{"value", value}, {"unit", unit}};
+}
+
+Json panel_json(const BuiltPanel& panel) {
+  const NurbsSurface& s = panel.face.surface;
+  const KnotMesh& mesh = panel.topology.mesh;
+  const auto cells = [&](CellKind kind) { return std::ranges::count(panel.topology.cells, kind); };
+  return {
+      {"name", panel.name},
+      {"degree", {s.u().degree(), s.v().degree()}},
+      {"spans", {mesh.u.size() - 1, mesh.v.size() - 1}},
+      {"control_points", {s.count_u(), s.count_v()}},
+      {"cells",
+       {{"inside", cells(CellKind::inside)}, {"cut", cells(CellKind::cut)}, {"outside", cells(CellKind::outside)}}}};
+}
+
+// What studies look at by name. A number that doesn't exist (nothing fell, so nothing can be compared with its work)
+// is left out.
+Json measures_json(const System& system, const RunResult& run, const StateMeasures& m) {
+  Json measures = {{"area", measured(m.area, "m2")},
+                   {"mass", measured(m.mass, "kg")},
+                   {"lowest", measured(m.lowest, "m")},
+                   {"highest", measured(m.highest, "m")},
+                   {"largest_deflection", measured(m.largest_deflection, "m")},
+                   {"strain_max", measured(m.strain.max.maxCoeff(), "1")},
+                   {"strain_min", measured(m.strain.min.minCoeff(), "1")},
+                   {"strain_p999", measured(m.strain.p999.maxCoeff(), "1")},
+                   {"strain_mean_abs", measured(m.strain.mean_abs.mean(), "1")}};
+  const double elastic = run.energy.elastic();
+  if (system.strain_rows > 0 && elastic > 0) measures["hourglass_share"] = measured(m.unseen_energy / elastic, "1");
+  const double fall = -run.energy.gravity;
+  if (fall > 0) measures["injected_over_gravity_work"] = measured(run.energy.injected / fall, "1");
+  for (std::size_t k = 0; k < m.points.size(); ++k) {
+    measures["point_" + std::to_string(k)] = {{"value", array(m.points[k])}, {"unit", "m"}};
+  }
+  return measures;
+}
+
+}  // namespace
+
+std::vector<std::pair<const char*, double>> energy_entries(const EnergyBalance& e) {
+  return {{"kinetic", e.kinetic},
+          {"membrane", e.membrane},
+          {"bending", e.bending},
+          {"limit", e.limit},
+          {"gravity", e.gravity},
+          {"dissipated", e.dissipated()},
+          {"dissipated_by_drag", 0 - e.drag_work},
+          {"dissipated_by_steps", e.numerical()},
+          {"loads_work", e.load_work},
+          {"motion_work", e.motion_work},
+          {"injected", e.injected}};
+}
+
+Json report_json(const Build& build, const RunResult& run, const StateMeasures& m, double write_seconds) {
+  const Scene& scene = build.scene;
+  const System& system = *run.system;
+  Json report;
+  report["scene"] = scene.name;
+  report["version"] = version();
+  report["exit"] = name(run.exit);
+  if (run.exit != RunExit::ok) report["reason"] = run.reason;
+  report["model"] = "shell";
+  report["scheme"] = "verlet";
+  report["panels"] = Json::array();
+  for (const BuiltPanel& panel : build.panels) report["panels"].push_back(panel_json(panel));
+  report["frames"] = run.frames;
+  report["steps"] = run.steps;
+  report["redone_steps"] = run.redone_steps;
+  report["simulated_seconds"] = run.time;
+  if (scene.rest) {
+    const Relaxation& r = run.relaxation;
+    report["rest"] = {
+        {"steps", r.steps}, {"halts", r.halts}, {"trials", r.trials}, {"tolerance", rest_tolerance(build)}};
+    // Left out where nothing can be said yet.
+    if (std::isfinite(r.remaining)) report["rest"]["remaining"] = r.remaining;
+  }
+  const double computing = run.wall_seconds - run.frame_seconds;
+  report["wall_seconds"] = computing;
+  report["wall_seconds_per_frame"] = run.time > run.from ? computing / ((run.time - run.from) * 30) : 0.0;
+  report["seconds"] = {{"read", build.read_seconds},
+                       {"trim", build.trim_seconds},
+                       {"force", run.force_seconds},
+                       {"projection", run.projection_seconds},
+                       {"time_step", run.bound_seconds},
+                       {"contact", 0.0},
+                       {"write", run.frame_seconds + write_seconds}};
+  report["dt"] = {{"min", run.dt_min}, {"max", run.dt_max}};
+  std::size_t points = 0, used = 0;
+  for (const auto& panel : system.points) {
+    points += panel.size();
+    used += static_cast<std::size_t>(std::ranges::count(panel, true, &ConstraintPoint::used));
+  }
+  report["degrees_of_freedom"] = 3 * system.map->nodes();
+  report["control_points"] = build.model->control_point_count();
+  report["constraint_points"] = points;
+  report["constraint_points_used"] = scene.strain_limit.on ? used : 0;
+  report["constraint_rows"] = {{"strain", system.strain_rows}, {"pins", 3 * system.place_rows}};
+  report["strain"] = {{"max_weft", m.strain.max[0]},
+                      {"max_warp", m.strain.max[1]},
+                      {"min_weft", m.strain.min[0]},
+                      {"min_warp", m.strain.min[1]},
+                      {"p999_weft", m.strain.p999[0]},
+                      {"p999_warp", m.strain.p999[1]},
+                      {"mean_abs_weft", m.strain.mean_abs[0]},
+                      {"mean_abs_warp", m.strain.mean_abs[1]},
+                      {"min_shear", m.shear.min},
+                      {"max_shear", m.shear.max},
+                      {"mean_abs_shear", m.shear.mean_abs},
+                      {"at_constraints_max", m.at_constraints_max}};
+  if (system.strain_rows > 0) {
+    report["strain"]["at_constraints"] = {{"min_weft", m.at_constraints.min[0]},
+                                          {"max_weft", m.at_constraints.max[0]},
+                                          {"min_warp", m.at_constraints.min[1]},
+                                          {"max_warp", m.at_constraints.max[1]}};
+  }
+  // One number, or what a band allows: [weft, warp] where the scene names a limit.
+  const StrainLimit& limit = scene.strain_limit;
+  if (limit.on && limit.weft.slack == 0) report["strain"]["limit"] = limit.tolerance;
+  if (limit.on && limit.weft.slack > 0) {
+    report["strain"]["limit"] = {{"compress", {limit.weft.compress, limit.warp.compress}},
+                                 {"tolerance", limit.tolerance}};
+    if (limit.stretched) report["strain"]["limit"]["stretch"] = {limit.weft.stretch, limit.warp.stretch};
+  }
+  report["points"] = Json::array();
+  for (std::size_t k = 0; k < m.points.size(); ++k) {
+    report["points"].push_back(
+        {{"panel", scene.points[k].panel}, {"uv", array(scene.points[k].uv)}, {"position", array(m.points[k])}});
+  }
+  report["reactions"] = Json::array();
+  for (std::size_t k = 0; k < m.reactions.size(); ++k) {
+    report["reactions"].push_back(
+        {{"pin", k}, {"panel", scene.pins[k].panel}, {"at", scene.pins[k].at.text}, {"force", array(m.reactions[k])}});
+  }
+  report["stress"] = stress(m.nominal);
+  report["stress"]["second_pk"] = stress(m.second_pk);
+  if (system.strain_rows > 0) {
+    report["stress"]["raw"] = stress(m.raw_nominal);
+    report["stress"]["raw"]["second_pk"] = stress(m.raw_second_pk);
+  }
+  report["energy"] = Json::object();
+  for (const auto& [what, joule] : energy_entries(run.energy)) report["energy"][what] = joule;
+  report["projection"] = {{"iterations_mean", run.steps > 0 ? run.iterations_sum / run.steps : 0.0},
+                          {"iterations_max", run.iterations_max},
+                          {"gram_nonzeros", system.projection ? system.projection->gram_nonzeros() : 0},
+                          {"unconverged_steps", run.unconverged_steps},
+                          {"solver", scene.strain_limit.solver == LimitSolver::lagrange ? "lagrange" : "projection"}};
+  // Numbers of what doesn't exist in a run are null, not 0: nothing touches and nothing is sewn in this version.
+  report["contact"] = {{"max_penetration", nullptr}, {"min_distance", nullptr}};
+  report["seams"] = {{"max_gap", nullptr}};
+  Json stages = Json::array({"shell"});
+  if (system.projection) stages.push_back("projection");
+  report["stages"] = stages;
+  // What each stage that ran took. `seconds` above counts the same seconds, of stages that didn't run too.
+  Json counters = {{"shell", {{"seconds", run.force_seconds}, {"bytes", build.model->table_bytes()}}}};
+  if (system.projection) {
+    counters["projection"] = {{"seconds", run.projection_seconds},
+                              {"bytes", sizeof(double) * system.projection->factor_nonzeros()}};
+  }
+  counters["steps"] = {{"count", run.steps + run.redone_steps}};
+  counters["time_step"] = {{"seconds", run.bound_seconds}};
+  if (!scene.formats.empty()) counters["frames"] = {{"seconds", run.frame_seconds}};
+  report["counters"] = counters;
+  Json warnings = Json::array();
+  for (const std::string& w : build.warnings) warnings.push_back(w);
+  for (const std::string& w : run.warnings) warnings.push_back(w);
+  report["warnings"] = warnings;
+  report["measures"] = measures_json(system, run, m);
+  return report;
+}
+
+}  // namespace toile

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pipeline/run/measures.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "analysis/constraint/stress_recovery.h"
+
+namespace toile {
+namespace {
+
+double percentile(const std::vector<double>& values, const std::vector<double>& weights, double fraction) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t k) { return values[k]; });
+  const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
+  double below = 0;
+  for (const std::size_t k : order) {
+    below += weights[k];
+    if (below >= fraction * total) return values[k];
+  }
+  return values.empty() ? 0 : values[order.back()];
+}
+
+// Of one direction, c.
+void extremes(const std::vector<double>& x, const std::vector<double>& weights, int c, Extremes& e) {
+  if (x.empty()) return;
+  double total = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    total += weights[k];
+    e.mean[c] += weights[k] * x[k];
+    e.mean_abs[c] += weights[k] * std::abs(x[k]);
+  }
+  e.mean[c] /= total;
+  e.mean_abs[c] /= total;
+  e.min[c] = *std::ranges::min_element(x);
+  e.max[c] = *std::ranges::max_element(x);
+  e.p001[c] = percentile(x, weights, 0.001);
+  e.p999[c] = percentile(x, weights, 0.999);
+}
+
+Extremes extremes(const std::vector<Eigen::Vector2d>& values, const std::vector<GridSample>& samples) {
+  Extremes e;
+  std::vector<double> weights, x(values.size());
+  for (const GridSample& s : samples) weights.push_back(s.weight);
+  for (int c = 0; c < 2; ++c) {
+    std::ranges::transform(values, x.begin(), [c](const Eigen::Vector2d& value) { return value[c]; });
+    extremes(x, weights, c, e);
+  }
+  return e;
+}
+
+ShearExtremes shear_extremes(const std::vector<double>& values, const std::vector<GridSample>& samples) {
+  if (values.empty()) return {};
+  const auto [least, most] = std::ranges::minmax(values);
+  double area = 0, sum = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    area += samples[k].weight;
+    sum += samples[k].weight * std::abs(values[k]);
+  }
+  return {least, most, sum / area};
+}
+
+// What eq. 37 gives at the rows themselves.
+void measure_rows(const ConstraintRows& rows, const std::vector<ThreadStress>& stress, StateMeasures& m) {
+  std::vector<double> nominal[2], second_pk[2], weights[2];
+  for (std::size_t r = 0; r < stress.size(); ++r) {
+    const int c = rows.strain[r].warp ? 1 : 0;
+    nominal[c].push_back(stress[r].nominal);
+    second_pk[c].push_back(stress[r].second_pk);
+    weights[c].push_back(rows.strain[r].area);
+  }
+  for (int c = 0; c < 2; ++c) {
+    extremes(nominal[c], weights[c], c, m.raw_nominal);
+    extremes(second_pk[c], weights[c], c, m.raw_second_pk);
+  }
+}
+
+// Strains that the limit holds, at its rows.
+void measure_limit(const ConstraintRows& rows, const Eigen::VectorXd& q, StateMeasures& m) {
+  for (const StrainRow& row : rows.strain) {
+    const double strain = 0.5 * (apply(row.row, q).squaredNorm() - 1);
+    const int c = row.warp ? 1 : 0;
+    m.at_constraints_max = std::max(m.at_constraints_max, std::abs(strain));
+    m.at_constraints.min[c] = std::min(m.at_constraints.min[c], strain);
+    m.at_constraints.max[c] = std::max(m.at_constraints.max[c], strain);
+  }
+}
+
+// Energy of the fabric's weft and warp strain over the cloth less that of the strains that the rows see: what hourglass
+// modes hold. Negative where the rows count more than there is.
+double unseen_energy(const Build& build, const System& system, const Eigen::VectorXd& q) {
+  const ShellModel& model = *build.model;
+  double energy = 0;
+  for (std::size_t k = 0; k < model.panels().size(); ++k) {
+    const ShellPanel& panel = model.panels()[k];
+    for (std::size_t p = 0; p < panel.quadrature.points.size(); ++p) {
+      const Eigen::Vector2d& uv = panel.quadrature.points[p];
+      const SurfaceJet jet = evaluate(panel.rest, uv.x(), uv.y());
+      const ShellState at = model.state(static_cast<int>(k), uv.x(), uv.y(), q);
+      energy += 0.5 * panel.quadrature.weights[p] * jet.area_scale() * at.second_pk.head<2>().dot(at.strain.head<2>());
+    }
+  }
+  for (const StrainRow& row : system.projection->rows().strain) {
+    const Fabric& fabric = model.panels()[static_cast<std::size_t>(row.panel)].fabric;
+    const double k = row.warp ? fabric.membrane.warp : fabric.membrane.weft,
+                 c = 0.5 * (apply(row.row, q).squaredNorm() - 1);
+    energy -= 0.5 * k * row.area * c * c;
+  }
+  return energy;
+}
+
+}  // namespace
+
+Eigen::VectorXd row_forces(const System& system, const Eigen::VectorXd& q, double dt) {
+  const std::vector<StrainRow>& rows = system.projection->rows().strain;
+  Eigen::VectorXd forces = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.size()));
+  for (Eigen::Index r = 0; dt > 0 && r < forces.size(); ++r) {
+    const Eigen::Vector3d impulse = system.projection->strain_impulses().col(r);
+    const Eigen::Vector3d tangent = apply(rows[static_cast<std::size_t>(r)].row, q);
+    forces[r] = std::copysign(impulse.norm(), impulse.dot(tangent)) / (dt * dt);
+  }
+  return forces;
+}
+
+Eigen::Vector3d up(const Scene& scene) {
+  const double g = scene.gravity.norm();
+  return g > 0 ? Eigen::Vector3d(-scene.gravity / g) : Eigen::Vector3d::UnitZ();
+}
+
+std::vector<GridSample> grid_samples(const Build& build, int n) {
+  std::vector<GridSample> samples;
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const BuiltPanel& panel = build.panels[k];
+    const NurbsSurface& rest = build.rest(static_cast<int>(k));
+    const Interval u = rest.u().domain(), v = rest.v().domain();
+    const double cell = u.length() / n * (v.length() / n);
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        const Eigen::Vector2d uv(u.min + u.length() * (i + 0.5) / n, v.min + v.length() * (j + 0.5) / n);
+        if (!contains(panel.face, panel.topology, uv)) continue;
+        const SurfaceJet jet = evaluate(rest, uv.x(), uv.y());
+        samples.push_back({static_cast<int>(k), uv, cell * jet.area_scale()});
+      }
+    }
+  }
+  return samples;
+}
+
+std::vector<Eigen::Vector3d> output_points(const Build& build, const Eigen::VectorXd& q) {
+  std::vector<Eigen::Vector3d> points;
+  for (const OutputPoint& point : build.scene.points)
+    points.push_back(build.model->state(build.panel(point.panel), point.uv.x(), point.uv.y(), q).position);
+  return points;
+}
+
+std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& system, const DynamicState& state,
+                                           double dt) {
+  std::vector<Eigen::Vector3d> out(build.scene.pins.size(), Eigen::Vector3d::Zero());
+  if (!(dt > 0)) return out;
+  const Reactions r = reactions(system.dynamic, state, dt);
+  for (std::size_t k = 0; k < system.fixed_pin.size(); ++k)
+    out[static_cast<std::size_t>(system.fixed_pin[k])] += r.fixed.col(static_cast<Eigen::Index>(k));
+  for (std::size_t k = 0; k < system.place_pin.size(); ++k)
+    out[static_cast<std::size_t>(system.place_pin[k])] += r.place.col(static_cast<Eigen::Index>(k));
+  return out;
+}
+
+StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt) {
+  StateMeasures m;
+  const ShellModel& model = *build.model;
+  const Eigen::VectorXd q = control_points(system, state);
+  const std::vector<GridSample> samples = grid_samples(build);
+  std::vector<Eigen::Vector2d> strain, nominal, second_pk;
+  std::vector<double> shear;
+  std::optional<StressField> field;
+  if (system.strain_rows > 0) {
+    const ConstraintRows& rows = system.projection->rows();
+    const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, q, dt), q);
+    field.emplace(model, rows, stress);
+    measure_rows(rows, stress, m);
+    m.unseen_energy = unseen_energy(build, system, q);
+  }
+  const Eigen::Vector3d axis = up(build.scene);
+  m.lowest = std::numeric_limits<double>::max();
+  m.highest = std::numeric_limits<double>::lowest();
+  const auto reach = [&](const Eigen::Vector3d& x) {
+    m.lowest = std::min(m.lowest, axis.dot(x));
+    m.highest = std::max(m.highest, axis.dot(x));
+  };
+  for (const GridSample& s : samples) {
+    const ShellState at = model.state(s.panel, s.uv.x(), s.uv.y(), q);
+    strain.emplace_back(at.strain.head<2>());
+    shear.push_back(at.strain[2]);
+    if (field) {
+      const auto [weft, warp] = field->at(s.panel, s.uv.x(), s.uv.y(), q);
+      second_pk.emplace_back(weft.second_pk, warp.second_pk);
+      nominal.emplace_back(weft.nominal, warp.nominal);
+    } else {
+      nominal.push_back(at.nominal);
+      second_pk.emplace_back(at.second_pk.head<2>());
+    }
+    reach(at.position);
+    const Eigen::Vector3d start = model.state(s.panel, s.uv.x(), s.uv.y(), build.start).position;
+    m.largest_deflection = std::max(m.largest_deflection, (at.position - start).norm());
+  }
+  m.strain = extremes(strain, samples);
+  m.shear = shear_extremes(shear, samples);
+  m.nominal = extremes(nominal, samples);
+  m.second_pk = extremes(second_pk, samples);
+
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    for (const ConstraintPoint& point : build.panels[k].points) {
+      const ShellState at = model.state(static_cast<int>(k), point.u, point.v, q);
+      reach(at.position);
+      if (system.strain_rows == 0) {
+        m.at_constraints_max = std::max(m.at_constraints_max, at.strain.head<2>().cwiseAbs().maxCoeff());
+      }
+    }
+  }
+  if (system.projection) measure_limit(system.projection->rows(), q, m);
+  for (const ShellPanel& panel : model.panels()) {
+    for (std::size_t k = 0; k < panel.quadrature.points.size(); ++k) {
+      const SurfaceJet jet = evaluate(panel.rest, panel.quadrature.points[k].x(), panel.quadrature.points[k].y());
+      const double area = panel.quadrature.weights[k] * jet.area_scale();
+      m.area += area;
+      m.mass += area * panel.fabric.density;
+    }
+  }
+  m.points = output_points(build, q);
+  m.reactions = pin_reactions(build, system, state, dt);
+  return m;
+}
+
+}  // namespace toile

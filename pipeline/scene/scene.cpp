@@ -1,0 +1,779 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pipeline/scene/scene.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "geometry/error.h"
+#include "geometry/measure.h"
+#include "io/file.h"
+#include "io/panel_file.h"
+#include "pipeline/scene/toml_table.h"
+#include "pipeline/scene/units.h"
+
+namespace toile {
+namespace {
+
+constexpr double degree_in_radians = std::numbers::pi / 180;
+
+std::string stem_of(const std::string& name, std::string_view suffix) {
+  return name.substr(0, name.size() - suffix.size());
+}
+
+std::vector<std::string> split_path(const std::string& path, const std::string& setting) {
+  std::vector<std::string> parts;
+  std::string part;
+  for (const char c : path) {
+    if (c == '.' || c == '[' || c == ']') {
+      if (!part.empty()) parts.push_back(std::exchange(part, {}));
+    } else {
+      part += c;
+    }
+  }
+  if (!part.empty()) parts.push_back(part);
+  if (parts.empty()) throw InputError(fmt::format("--set {}: expected key=value", setting));
+  return parts;
+}
+
+void assign(toml::table& root, const std::string& setting) {
+  const std::size_t equals = setting.find('=');
+  if (equals == std::string::npos) throw InputError(fmt::format("--set {}: expected key=value", setting));
+  std::string key = setting.substr(0, equals);
+  while (!key.empty() && key.back() == ' ') key.pop_back();
+  const std::vector<std::string> parts = split_path(key, setting);
+  const std::string value = setting.substr(equals + 1);
+  if (parts.size() > deepest_key) throw InputError(fmt::format("--set: a key has more than {} parts", deepest_key));
+  refuse_deep_keys(value, "--set");
+  toml::table parsed;
+  try {
+    parsed = toml::parse("x = " + value);
+    if (parsed.size() != 1) throw InputError(fmt::format("--set {}: expected one value", setting));
+  } catch (const toml::parse_error&) {
+    // Shells eat quotes: what isn't TOML is a string.
+    parsed.insert_or_assign("x", value);
+  }
+  toml::node& fresh = *parsed.get("x");
+
+  toml::node* node = &root;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const bool last = k + 1 == parts.size();
+    if (toml::table* table = node->as_table()) {
+      if (last) {
+        table->insert_or_assign(parts[k], fresh);
+        return;
+      }
+      toml::node* next = table->get(parts[k]);
+      if (!next) {
+        const bool index = parts[k + 1].find_first_not_of("0123456789") == std::string::npos;
+        if (index) {
+          table->insert_or_assign(parts[k], toml::array{});
+        } else {
+          table->insert_or_assign(parts[k], toml::table{});
+        }
+        next = table->get(parts[k]);
+      }
+      node = next;
+    } else if (toml::array* array = node->as_array()) {
+      std::size_t index = 0;
+      const auto [end, error] = std::from_chars(parts[k].data(), parts[k].data() + parts[k].size(), index);
+      if (error != std::errc() || end != parts[k].data() + parts[k].size() || index > array->size()) {
+        throw InputError(fmt::format("--set {}: '{}' must be an index from 0 to {}", setting, parts[k], array->size()));
+      }
+      if (last) {
+        if (index == array->size()) {
+          array->push_back(fresh);
+        } else {
+          array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(index), fresh);
+        }
+        return;
+      }
+      if (index == array->size()) array->push_back(toml::table{});
+      node = array->get(index);
+    } else {
+      throw InputError(
+          fmt::format("--set {}: '{}' is {}, which holds no keys", setting, parts[k - 1], type_name(*node)));
+    }
+  }
+}
+
+// Appends every value below a node, and empty tables and arrays, which may mean something.
+void list_keys(const toml::node& node, const std::string& path,
+               std::vector<std::pair<std::string, std::string>>& keys) {
+  const auto below = [&](const auto& key) {
+    return path.empty() ? fmt::format("{}", key) : fmt::format("{}.{}", path, key);
+  };
+  if (const toml::table* table = node.as_table(); table && !table->empty()) {
+    for (const auto& [key, value] : *table) list_keys(value, below(key.str()), keys);
+  } else if (const toml::array* array = node.as_array(); array && !array->empty()) {
+    for (std::size_t k = 0; k < array->size(); ++k) list_keys((*array)[k], below(k), keys);
+  } else if (node.is_string()) {
+    keys.emplace_back(path, fmt::format("\"{}\"", *node.value<std::string>()));
+  } else if (node.is_boolean()) {
+    keys.emplace_back(path, *node.value<bool>() ? "true" : "false");
+  } else if (node.is_number()) {
+    keys.emplace_back(path, fmt::format("{}", *node.value<double>()));
+  } else {
+    keys.emplace_back(path, type_name(node));
+  }
+}
+
+Placement read_placement(Table table) {
+  Placement place;
+  if (const auto v = table.vector<3>("translate", dimension::length)) place.translate = *v;
+  if (const auto v = table.vector<3>("rotate_deg", dimension::angle, degree_in_radians)) place.rotate = *v;
+  table.done();
+  return place;
+}
+
+Fabric read_fabric(Table table) {
+  Fabric fabric;
+  if (const auto base = table.string("like")) {
+    const auto presets = fabric_presets();
+    const auto it = std::ranges::find(presets, *base, &FabricPreset::name);
+    if (it == presets.end()) {
+      std::vector<std::string> names;
+      for (const FabricPreset& p : presets) names.push_back(p.name);
+      table.fail(*table.raw().get("like"), fmt::format("unknown fabric '{}'{}", *base, suggestion(*base, names)));
+    }
+    fabric = it->fabric;
+  }
+  table.number(fabric.density, "density", dimension::area_density, Range::positive);
+  table.number(fabric.thickness, "thickness", dimension::length, Range::positive);
+  if (auto membrane = table.table("membrane", "membrane")) {
+    membrane->number(fabric.membrane.weft, "weft", dimension::force_per_length, Range::nonnegative);
+    membrane->number(fabric.membrane.warp, "warp", dimension::force_per_length, Range::nonnegative);
+    membrane->number(fabric.membrane.shear, "shear", dimension::force_per_length, Range::nonnegative);
+    membrane->done();
+  }
+  if (auto bending = table.table("bending", "bending")) {
+    Fabric::Bending& law = fabric.bending;
+    bending->number(law.b0, "b0", dimension::moment, Range::nonnegative);
+    bending->number(law.kappa0, "kappa0", dimension::curvature, Range::positive);
+    law.kappa_reg = bending->number("kappa_reg", dimension::curvature, Range::positive).value_or(law.kappa0 / 1000);
+    bending->number(law.twist, "twist", dimension::moment, Range::nonnegative);
+    if (law.kappa_reg > law.kappa0) {
+      const toml::node* node = bending->raw().get("kappa_reg");
+      throw InputError(fmt::format("{}: kappa_reg in bending is {} 1/m, must not exceed kappa0 = {} 1/m",
+                                   node ? bending->place(*node) : bending->where(), law.kappa_reg, law.kappa0));
+    }
+    bending->done();
+  }
+  table.number(fabric.drag, "drag", dimension::area_drag, Range::nonnegative);
+  table.number(fabric.friction, "friction", dimension::none, Range::nonnegative);
+  if (const auto curvature = table.choice("rest_curvature", {"panel", "zero"}, {})) {
+    fabric.rest_curvature = *curvature == "zero" ? RestCurvature::zero : RestCurvature::panel;
+  }
+  table.choice("law", {"weft-warp"}, {"isotropic", "orthotropic-3d"});
+  table.done();
+  return fabric;
+}
+
+std::filesystem::path beside(const std::filesystem::path& scene, const std::string& file) {
+  const std::filesystem::path path(file);
+  return path.is_absolute() ? path : scene.parent_path() / path;
+}
+
+struct Fabrics {
+  std::vector<std::pair<std::string, Fabric>> named;
+  std::vector<std::string> names() const {
+    std::vector<std::string> result;
+    for (const auto& [name, fabric] : named) result.push_back(name);
+    for (const FabricPreset& preset : fabric_presets()) result.push_back(preset.name);
+    return result;
+  }
+  const Fabric* find(const std::string& name) const {
+    for (const auto& [n, fabric] : named) {
+      if (n == name) return &fabric;
+    }
+    for (const FabricPreset& preset : fabric_presets()) {
+      if (preset.name == name) return &preset.fabric;
+    }
+    return nullptr;
+  }
+};
+
+ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fabrics& fabrics) {
+  ScenePanel panel;
+  panel.where = table.where();
+  panel.name = table.string("name").value_or("");
+  const char* key = "file";
+  auto file = table.string(key);
+  if (const auto pattern = table.string("pattern")) {
+    if (file) table.fail(*table.raw().get("pattern"), "a panel has a file or a pattern, not both");
+    file = pattern;
+    key = "pattern";
+  }
+  if (!file)
+    table.missing("file", "the IGES file (or pattern = a sewing pattern) that holds the panel, relative to the scene");
+  panel.file = beside(scene, *file);
+  std::error_code error;
+  if (!std::filesystem::exists(panel.file, error)) {
+    table.fail(*table.raw().get(key), fmt::format("{} '{}' does not exist", key, panel.file.string()));
+  }
+  panel.choice.size = table.string("size").value_or("");
+  panel.choice.unit = table.string("unit").value_or("");
+  if (const auto outline = table.choice("outline", {"cut", "sew"}, {})) panel.choice.outline = *outline;
+  panel.start = table.string("start");
+  if (auto refine = table.table("refine", "refine")) {
+    panel.degree = refine->integer("degree", 2, 5);
+    panel.span = refine->number("span", dimension::length, Range::positive);
+    panel.spans = refine->integers("spans", 1, 10000);
+    panel.control_points = refine->integers("control_points", 2, 10000);
+    if (panel.span.has_value() + panel.spans.has_value() + panel.control_points.has_value() > 1) {
+      throw InputError(refine->where() + ": refine takes one of span, spans and control_points");
+    }
+    refine->done();
+  }
+  panel.grain = table.number("grain_deg", dimension::angle, Range::any, degree_in_radians);
+  if (auto place = table.table("place", "place")) panel.place = read_placement(*place);
+  panel.fabric_name = table.string("fabric").value_or("kidnapped");
+  const Fabric* fabric = fabrics.find(panel.fabric_name);
+  if (!fabric) {
+    table.fail(*table.raw().get("fabric"),
+               fmt::format("unknown fabric '{}'{}", panel.fabric_name, suggestion(panel.fabric_name, fabrics.names())));
+  }
+  panel.fabric = *fabric;
+  table.done();
+  return panel;
+}
+
+// The panel that a pin, traction or output point names; may be left out where there is only one.
+std::string panel_key(Table& table, const std::vector<ScenePanel>& panels) {
+  const auto name = table.string("panel");
+  if (!name) {
+    if (panels.size() == 1) return panels[0].name;
+    table.missing("panel", "the scene has several");
+  }
+  std::vector<std::string> names;
+  for (const ScenePanel& panel : panels) names.push_back(panel.name);
+  if (std::ranges::find(names, *name) == names.end()) {
+    table.fail(*table.raw().get("panel"), fmt::format("no panel is called '{}'{}", *name, suggestion(*name, names)));
+  }
+  return *name;
+}
+
+Address address(Table& table, const std::string& key) {
+  const auto text = table.string(key);
+  if (!text) table.missing(key, "an address such as corner:0,0");
+  try {
+    return parse_address(*text);
+  } catch (const InputError& error) {
+    table.fail(*table.raw().get(key), error.what());
+  }
+}
+
+PinMotion read_motion(Table& move) {
+  PinMotion motion;
+  if (const auto v = move.vector<3>("translate", dimension::length)) motion.translate = *v;
+  if (const auto v = move.vector<3>("rotate_deg", dimension::angle, degree_in_radians)) motion.rotate = *v;
+  motion.centre = move.vector<3>("centre", dimension::length);
+  move.number(motion.start, "start", dimension::time, Range::nonnegative);
+  const auto end = move.number("end", dimension::time, Range::positive);
+  if (!end) move.missing("end", "the time at which the motion is complete");
+  motion.end = *end;
+  if (!(motion.start < motion.end)) {
+    move.fail(*move.raw().get("end"),
+              fmt::format("end in move is {} s, must come after start = {} s", motion.end, motion.start));
+  }
+  move.done();
+  return motion;
+}
+
+ScenePin read_pin(Table table, const std::vector<ScenePanel>& panels) {
+  ScenePin pin;
+  pin.where = table.where();
+  pin.panel = panel_key(table, panels);
+  pin.at = address(table, "at");
+  pin.clamp = table.boolean("clamp").value_or(false);
+  if (auto move = table.table("move", "move")) pin.move = read_motion(*move);
+  pin.release = table.number("release", dimension::time, Range::nonnegative);
+  table.done();
+  return pin;
+}
+
+SceneTraction read_traction(Table table, const std::vector<ScenePanel>& panels) {
+  SceneTraction traction;
+  traction.where = table.where();
+  traction.panel = panel_key(table, panels);
+  traction.along = address(table, "along");
+  if (traction.along.kind != Address::Kind::edge && traction.along.kind != Address::Kind::curve) {
+    table.fail(*table.raw().get("along"),
+               fmt::format("along = \"{}\": expected edge:... or curve:...", traction.along.text));
+  }
+  const auto force = table.vector<3>("force", dimension::force_per_length);
+  if (!force) table.missing("force", "a vector in N/m");
+  traction.force = *force;
+  table.done();
+  return traction;
+}
+
+// curves = [0, 1, 2]; empty where there is no such key.
+std::vector<int> read_curves(Table& table) {
+  const toml::node* node = table.find("curves");
+  if (!node) return {};
+  std::vector<int> out;
+  const toml::array* array = node->as_array();
+  for (std::size_t k = 0; array && k < array->size(); ++k) {
+    const auto number = (*array)[k].value<std::int64_t>();
+    if (!number || *number < 0 || *number > 1000000) array = nullptr;
+    if (number) out.push_back(static_cast<int>(*number));
+  }
+  if (!array || out.empty())
+    table.fail(*node, "curves must be an array of the curves' numbers in their loop, such as [0, 1]");
+  return out;
+}
+
+SeamSide read_seam_side(Table& seam, const char* key, const std::vector<ScenePanel>& panels) {
+  auto table = seam.table(key, fmt::format("{} of [[seam]]", key));
+  if (!table) seam.missing(key, "one side, such as { panel = \"front\", loop = 0, curve = 1 }");
+  SeamSide side;
+  side.panel = panel_key(*table, panels);
+  side.loop = table->integer("loop", 0, 1000000).value_or(0);
+  const auto curve = table->integer("curve", 0, 1000000);
+  side.curves = read_curves(*table);
+  if (curve && !side.curves.empty())
+    table->fail(*table->raw().get("curves"), "a side has a curve or curves = [...], not both");
+  if (curve) side.curves = {*curve};
+  if (side.curves.empty()) table->missing("curve", "its number in the loop; toile inspect shows it");
+  table->number(side.from, "from", dimension::none, Range::nonnegative);
+  table->number(side.to, "to", dimension::none, Range::positive);
+  if (!(side.from < side.to && side.to <= 1)) {
+    throw InputError(
+        fmt::format("{}: a side runs from {} to {} of its length, must be fractions of 0 to 1, from below to",
+                    table->where(), side.from, side.to));
+  }
+  side.reverse = table->boolean("reverse").value_or(false);
+  table->done();
+  return side;
+}
+
+SceneSeam read_seam(Table table, const std::vector<ScenePanel>& panels) {
+  SceneSeam seam;
+  seam.where = table.where();
+  seam.a = read_seam_side(table, "a", panels);
+  seam.b = read_seam_side(table, "b", panels);
+  table.done();
+  for (const int curve : seam.a.curves) {
+    const bool there = std::ranges::find(seam.b.curves, curve) != seam.b.curves.end();
+    const bool apart = seam.a.to <= seam.b.from || seam.b.to <= seam.a.from;
+    const bool part = seam.a.curves == seam.b.curves && apart;
+    if (seam.a.panel != seam.b.panel || seam.a.loop != seam.b.loop || !there || part) continue;
+    throw InputError(fmt::format("{}: the seam joins curve {},{} of panel '{}' with itself", seam.where, seam.a.loop,
+                                 curve, seam.a.panel));
+  }
+  return seam;
+}
+
+SceneObstacle read_obstacle(Table table, const std::filesystem::path& scene) {
+  SceneObstacle obstacle;
+  obstacle.where = table.where();
+  const auto mesh = table.string("mesh");
+  if (!mesh) table.missing("mesh", "a file of triangles, relative to the scene");
+  obstacle.mesh = beside(scene, *mesh);
+  std::error_code error;
+  if (!std::filesystem::exists(obstacle.mesh, error)) {
+    table.fail(*table.raw().get("mesh"), fmt::format("mesh '{}' does not exist", obstacle.mesh.string()));
+  }
+  if (const auto unit = table.string("unit")) {
+    try {
+      obstacle.metres_per_unit = parse_quantity("1 " + *unit, dimension::length);
+    } catch (const InputError&) {
+      table.fail(*table.raw().get("unit"),
+                 fmt::format("unit is \"{}\", must be a length unit such as \"m\" or \"cm\"", *unit));
+    }
+  }
+  if (auto place = table.table("place", "place")) obstacle.place = read_placement(*place);
+  table.number(obstacle.friction, "friction", dimension::none, Range::nonnegative);
+  table.number(obstacle.thickness, "thickness", dimension::length, Range::nonnegative);
+  if (auto move = table.table("move", "move")) obstacle.move = read_motion(*move);
+  table.done();
+  return obstacle;
+}
+
+FrameFormat frame_format(Table& table, const toml::node& entry) {
+  static const std::vector<std::string> names{"iges", "vtu", "obj", "ply", "stl", "glb", "json", "csv"};
+  const std::string name = entry.value<std::string>().value_or("");
+  const auto found = std::ranges::find(names, name);
+  if (found == names.end())
+    table.fail(entry, fmt::format("unknown frame format '{}'{}", name, suggestion(name, names)));
+  return static_cast<FrameFormat>(found - names.begin());
+}
+
+void read_output(Table table, Scene& scene) {
+  table.number(scene.every, "every", dimension::time, Range::positive);
+  if (const toml::node* node = table.find("formats")) {
+    const toml::array* array = node->as_array();
+    if (!array) table.fail(*node, "formats in [output] must be an array such as [\"iges\", \"vtu\"]");
+    scene.formats.clear();
+    for (const toml::node& entry : *array) scene.formats.push_back(frame_format(table, entry));
+  }
+  if (const auto rows = table.choice("history", {"frame", "step", "off"}, {})) {
+    scene.history = *rows == "off" ? HistoryRows::off : *rows == "step" ? HistoryRows::steps : HistoryRows::frames;
+  }
+  if (const auto preview = table.boolean("preview")) scene.preview = *preview;
+  for (Table& point : table.tables("points", "points")) {
+    OutputPoint p;
+    p.where = point.where();
+    p.panel = panel_key(point, scene.panels);
+    const auto uv = point.vector<2>("uv", dimension::none);
+    if (!uv) point.missing("uv", "parameters on the panel");
+    p.uv = *uv;
+    point.done();
+    scene.points.push_back(p);
+  }
+  table.done();
+}
+
+std::string scene_name(const std::filesystem::path& path) {
+  const std::string stem = path.stem().string();
+  if (stem != "scene") return stem;
+  std::error_code gone;  // the current directory may be
+  const std::string folder = std::filesystem::absolute(path, gone).lexically_normal().parent_path().filename().string();
+  return folder.empty() ? stem : folder;
+}
+
+// "mode": inextensible resists from the first strain on and stays within the tolerance; band lets cloth strain freely
+// to 90 % of the limits, each direction and sign its own.
+void read_limit(Table table, Scene& scene) {
+  constexpr double band_slack = 0.9, band_tolerance = 0.01;  // of the limits
+  StrainLimit& limit = scene.strain_limit;
+  const auto mode = table.choice("mode", {"inextensible", "band", "off"}, {});
+  limit.on = !mode || *mode != "off";
+  const bool band = mode && *mode == "band";
+  table.number(limit.tolerance, "tolerance", dimension::none, Range::positive);
+  constexpr double free = 0.5;  // C = -1/2 is a thread of no length
+  if (limit.tolerance > free)
+    table.fail(
+        *table.raw().get("tolerance"),
+        fmt::format("tolerance in [strain_limit] is {}, must be at most {}: a strain of -{} is a thread of no length",
+                    limit.tolerance, free, free));
+  limit.weft = limit.warp = {limit.tolerance, limit.tolerance};
+  if (band) {
+    const auto stretch = table.vector<2>("stretch", dimension::none),
+               compress = table.vector<2>("compress", dimension::none);
+    if (!stretch && !compress)
+      throw InputError(table.where() +
+                       ": mode = \"band\" needs stretch = [weft, warp], compress = [weft, warp], or both");
+    limit.stretched = stretch.has_value();
+    for (int k : {0, 1}) {
+      StrainBand& b = k == 0 ? limit.weft : limit.warp;
+      b = {stretch ? (*stretch)[k] : 1e3, compress ? (*compress)[k] : free, band_slack};
+      if (!(b.stretch > 0 && b.compress > 0))
+        throw InputError(table.where() +
+                         ": stretch and compress are strains above 0 in weft and warp, such as [0.05, 0.02]");
+      if (b.compress > free)
+        throw InputError(fmt::format("{}: compress is {}, must be at most {}: a strain of -{} is a thread of no length",
+                                     table.where(), b.compress, free, free));
+    }
+    if (!table.find("tolerance"))
+      limit.tolerance =
+          band_tolerance * std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
+  } else {
+    for (const char* key : {"stretch", "compress"})
+      table.refuse(key, fmt::format("{} belongs to mode = \"band\"", key));
+  }
+  if (table.find("stiffness")) {
+    double stiffness = 0;
+    table.number(stiffness, "stiffness", dimension::force_per_length, Range::positive);
+    limit.stiffness = stiffness;
+  }
+  if (const auto variant = table.choice("variant", {"second-order", "paper"}, {}))
+    limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::second_order;
+  if (band && limit.variant == ProjectionVariant::paper)
+    throw InputError(table.where() + ": variant = \"paper\" has no bands");
+  // "fast" is another word for the projection.
+  if (const auto solver = table.choice("solver", {"projection", "fast", "lagrange"}, {"springs"});
+      solver && *solver == "lagrange") {
+    limit.solver = LimitSolver::lagrange;
+    if (band) throw InputError(table.where() + ": solver = \"lagrange\" has no bands");
+    for (const char* key : {"stiffness", "variant"})
+      table.refuse(
+          key,
+          fmt::format("{} belongs to solver = \"projection\"; \"lagrange\" holds the limit as hard equalities", key));
+  }
+  std::vector<std::string> rules;
+  for (const NamedRule& rule : point_rules()) rules.emplace_back(rule.name);
+  if (const auto points = table.choice("points", rules, {})) limit.points = *point_rule(*points);
+  table.number(limit.regularisation, "regularisation", dimension::none, Range::nonnegative);
+  if (const auto n = table.integer("max_iterations", 1, 10000)) limit.max_iterations = *n;
+  table.done();
+}
+
+void read_solver(Table table, Scene& scene) {
+  table.choice("model", {"shell"}, {"hinge", "solid", "spring", "fem"});
+  table.choice("scheme", {"verlet"}, {"newmark", "backward-euler"});
+  if (const toml::node* node = table.find("dt")) {
+    if (!(node->is_string() && *node->value<std::string>() == "auto")) {
+      scene.dt = table.quantity(*node, "dt in [solver]", dimension::time, Range::positive);
+    }
+  }
+  if (const toml::node* node = table.find("until")) {
+    if (node->is_string() && *node->value<std::string>() == "rest") {
+      scene.rest.emplace();
+      scene.until = std::numeric_limits<double>::infinity();
+    } else {
+      scene.until = table.quantity(*node, "until in [solver]", dimension::time, Range::positive);
+    }
+  }
+  if (auto rest = table.table("rest", "rest in [solver]")) {
+    if (!scene.rest) table.fail(*table.raw().get("rest"), "rest in [solver] belongs to until = \"rest\"");
+    scene.rest->tolerance = rest->number("tolerance", dimension::length, Range::positive);
+    if (const auto n = rest->integer("max_steps", 1, 1000000000)) scene.rest->max_steps = *n;
+    rest->done();
+  }
+  table.number(scene.energy_gain, "energy_gain", dimension::none, Range::positive);
+  scene.time_limit = table.number("time_limit", dimension::time, Range::positive);
+  table.done();
+}
+
+// The tables that don't depend on the panels' own tables.
+void read_settings(Table& top, Scene& scene) {
+  if (auto table = top.table("strain_limit", "[strain_limit]")) read_limit(*table, scene);
+  if (auto table = top.table("load", "[load]")) {
+    if (const auto v = table->vector<3>("gravity", dimension::acceleration)) scene.gravity = *v;
+    if (const auto v = table->vector<3>("wind", dimension::velocity)) scene.wind = *v;
+    // Beyond any cloth; far beyond, energies overflow.
+    constexpr double most = 1e6;
+    if (scene.gravity.norm() > most || scene.wind.norm() > most)
+      throw InputError(
+          fmt::format("{}: gravity and wind in [load] must be below {} m/s2 and m/s", table->where(), most));
+    table->done();
+  }
+  if (auto table = top.table("solver", "[solver]")) read_solver(*table, scene);
+  if (auto table = top.table("output", "[output]")) read_output(*table, scene);
+  if (!scene.rest && scene.until / scene.every > 1e6) {
+    throw InputError(fmt::format("{}: until = {} s with a frame every {} s would be more than a million frames",
+                                 scene.path.string(), scene.until, scene.every));
+  }
+  if (!scene.rest && scene.dt && scene.until / *scene.dt > 1e9) {
+    throw InputError(fmt::format("{}: dt = {} s up to until = {} s would be more than a thousand million steps",
+                                 scene.path.string(), *scene.dt, scene.until));
+  }
+}
+
+// A release that misses a frame, another release or the end by rounding is meant to be there; the step between them
+// would have no length.
+void snap_releases(Scene& scene) {
+  const double near = 1e-6 * std::min(scene.every, scene.until);
+  std::vector<double> releases;
+  for (ScenePin& pin : scene.pins) {
+    if (!pin.release) continue;
+    double& t = *pin.release;
+    if (t < scene.until + near) {
+      std::vector<double> meant = releases;
+      meant.push_back(std::round(t / scene.every) * scene.every);
+      meant.push_back(scene.until);
+      for (const double m : meant) {
+        if (std::abs(t - m) < near) t = m;
+      }
+    }
+    releases.push_back(t);
+  }
+}
+
+// Cloth that falls for ever has no rest.
+void require_pins_for_rest(const Scene& scene) {
+  if (!scene.rest) return;
+  for (const ScenePanel& panel : scene.panels) {
+    const auto holds = [&](const ScenePin& pin) { return pin.panel == panel.name && !pin.release; };
+    const auto pulls = [&](const SceneTraction& traction) { return traction.panel == panel.name; };
+    if (std::ranges::any_of(scene.pins, holds)) continue;
+    if (scene.gravity.isZero(0) && scene.wind.isZero(0) && std::ranges::none_of(scene.tractions, pulls)) continue;
+    throw InputError(
+        fmt::format("{}: until = \"rest\", but no pin holds panel '{}' for good", panel.where, panel.name));
+  }
+}
+
+Scene read_tables(toml::table& root, const std::filesystem::path& path, std::span<const std::string> settings) {
+  for (const std::string& setting : settings) assign(root, setting);
+  Scene scene;
+  scene.path = path;
+  scene.name = scene_name(path);
+  Table top(root, "the scene", path.string());
+  top.refuse("contact_pair",
+             "[[contact_pair]] is not supported by this version, which drapes panels with pins, "
+             "tractions, gravity and wind");
+  Fabrics fabrics;
+  if (auto table = top.table("fabric", "[fabric]")) {
+    for (const auto& [name, node] : table->raw()) {
+      fabrics.named.emplace_back(name.str(),
+                                 read_fabric(table->as_table(node, fmt::format("[fabric.{}]", name.str()))));
+    }
+  }
+  for (Table& table : top.tables("panel", "[[panel]]")) {
+    scene.panels.push_back(read_panel(table, path, fabrics));
+    ScenePanel& panel = scene.panels.back();
+    for (std::size_t k = 0; k + 1 < scene.panels.size(); ++k) {
+      if (scene.panels[k].file == panel.file && scene.panels[k].choice == panel.choice) ++panel.order;
+      if (!panel.name.empty() && scene.panels[k].name == panel.name) {
+        throw InputError(fmt::format("{}: two panels are called '{}'", panel.where, panel.name));
+      }
+    }
+    if (panel.name.empty()) {
+      panel.named = false;
+      panel.name = fmt::format("panel_{}", scene.panels.size());
+    }
+  }
+  if (scene.panels.empty()) throw InputError(fmt::format("{}: the scene has no [[panel]]", path.string()));
+  for (Table& table : top.tables("pin", "[[pin]]")) scene.pins.push_back(read_pin(table, scene.panels));
+  for (Table& table : top.tables("traction", "[[traction]]")) {
+    scene.tractions.push_back(read_traction(table, scene.panels));
+  }
+  for (Table& table : top.tables("seam", "[[seam]]")) scene.seams.push_back(read_seam(table, scene.panels));
+  for (Table& table : top.tables("obstacle", "[[obstacle]]")) scene.obstacles.push_back(read_obstacle(table, path));
+  read_settings(top, scene);
+  snap_releases(scene);
+  require_pins_for_rest(scene);
+  top.done();
+  list_keys(root, "", scene.keys);
+  return scene;
+}
+
+}  // namespace
+
+Eigen::Matrix3d Placement::rotation() const {
+  using Eigen::AngleAxisd;
+  using Eigen::Vector3d;
+  if (rotate.isZero(0)) return Eigen::Matrix3d::Identity();
+  return (AngleAxisd(rotate[2], Vector3d::UnitZ()) * AngleAxisd(rotate[1], Vector3d::UnitY()) *
+          AngleAxisd(rotate[0], Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& mean, double t) const {
+  const double tau = std::clamp((t - start) / (end - start), 0.0, 1.0);
+  if (tau == 0) return x;
+  const double s = tau * tau * tau * (10 + tau * (-15 + 6 * tau));
+  const Eigen::Vector3d c = centre.value_or(mean);
+  return c + Placement{{0, 0, 0}, s * rotate}.rotation() * (x - c) + s * translate;
+}
+
+Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
+  toml::table root = parse_toml(text, path);
+  return read_tables(root, path, settings);
+}
+
+Scene read_scene(const std::filesystem::path& path, std::span<const std::string> settings) {
+  return parse_scene(read_file(path), path, settings);
+}
+
+namespace {
+
+// A span that shows how a panel of this size drapes, some 24 along its longer side, in whole millimetres; nothing where
+// the file's own knots are that fine already.
+std::optional<double> draping_span(const TrimmedSurface& face) {
+  constexpr double spans = 24;
+  const double size = bounding_box(face.surface).diagonal().maxCoeff() * face.metres_per_unit;
+  const auto count = std::max(face.surface.u().spans().size(), face.surface.v().spans().size());
+  if (!(size > 0) || static_cast<double>(count) >= spans / 2) return std::nullopt;
+  const double millimetres = std::ceil(1000 * size / spans);
+  return std::max(1.0, millimetres) / 1000;
+}
+
+}  // namespace
+
+Scene quick_scene(const QuickScene& request, std::span<const std::string> settings) {
+  const auto read =
+      std::make_shared<const ReadFile>(ReadFile{read_panels(request.file, request.choice), request.choice});
+  const PanelFile& file = read->file;
+  const auto has = [&](const std::string& name) {
+    return std::ranges::any_of(file.panels, [&](const TrimmedSurface& face) { return face.name == name; });
+  };
+  const auto ends = [](const std::string& name, std::string_view suffix) {
+    return name.size() > suffix.size() && std::string_view(name).substr(name.size() - suffix.size()) == suffix;
+  };
+  Scene scene;
+  scene.read = read;
+  scene.path = request.file;
+  scene.name = request.file.stem().string();
+  scene.strain_limit.on = true;
+  for (std::size_t k = 0; k < file.panels.size(); ++k) {
+    ScenePanel panel;
+    panel.name = file.panels[k].name;
+    panel.where = request.file.string();
+    panel.file = request.file;
+    panel.choice = request.choice;
+    if (ends(panel.name, draped_suffix) && has(stem_of(panel.name, draped_suffix) + std::string(flat_suffix))) continue;
+    if (ends(panel.name, flat_suffix) && has(stem_of(panel.name, flat_suffix) + std::string(draped_suffix))) {
+      panel.start = stem_of(panel.name, flat_suffix) + std::string(draped_suffix);
+    }
+    const bool taken = std::ranges::any_of(scene.panels, [&](const ScenePanel& p) { return p.name == panel.name; });
+    panel.named = !panel.name.empty() && !taken;
+    panel.order = static_cast<int>(k);
+    if (!panel.named) panel.name = fmt::format("panel_{}", k + 1);
+    if (!panel.start) {
+      panel.degree = request.degree;
+      panel.span = request.span;
+      if (!request.span) {
+        if (const auto chosen = draping_span(file.panels[k])) {
+          panel.span = chosen;
+          scene.notes.push_back(
+              fmt::format("panel '{}': refined to spans of {} mm (--span chooses others)", panel.name, 1000 * *chosen));
+        }
+      }
+    }
+    panel.fabric_name = request.fabric;
+    const auto presets = fabric_presets();
+    const auto preset = std::ranges::find(presets, request.fabric, &FabricPreset::name);
+    if (preset == presets.end()) throw InputError(fmt::format("--fabric: unknown fabric '{}'", request.fabric));
+    panel.fabric = preset->fabric;
+    scene.panels.push_back(std::move(panel));
+  }
+  if (scene.panels.empty()) throw InputError(fmt::format("{}: holds no panel", request.file.string()));
+  for (const std::string& text : request.pins) {
+    for (const ScenePanel& panel : scene.panels) {
+      ScenePin pin;
+      pin.panel = panel.name;
+      pin.at = parse_address(text);
+      pin.where = "--pin " + text;
+      scene.pins.push_back(std::move(pin));
+    }
+  }
+  // The settings of a scene file's own tables apply here too.
+  toml::table root;
+  for (const std::string& setting : settings) assign(root, setting);
+  Table top(root, "the scene", "--set");
+  read_settings(top, scene);
+  require_pins_for_rest(scene);
+  top.done();
+  for (std::size_t k = 0; k < request.pins.size(); ++k) {
+    scene.keys.emplace_back(fmt::format("--pin {}", k), request.pins[k]);
+  }
+  scene.keys.emplace_back("--fabric", request.fabric);
+  if (!request.choice.size.empty()) scene.keys.emplace_back("--size", request.choice.size);
+  if (!request.choice.unit.empty()) scene.keys.emplace_back("--unit", request.choice.unit);
+  if (!request.choice.outline.empty()) scene.keys.emplace_back("--outline", request.choice.outline);
+  if (request.degree) scene.keys.emplace_back("--degree", fmt::format("{}", *request.degree));
+  if (request.span) scene.keys.emplace_back("--span", fmt::format("{} m", *request.span));
+  list_keys(root, "", scene.keys);
+  return scene;
+}
+
+std::span<const FabricPreset> fabric_presets() {
+  // k/rho, rho, eta, B0 of the examples of Peng & Zheng 2022; k h = (k/rho) rho, shear k/2.5.
+  static const auto make = [](double k_over_rho, double density, double drag, double b0, double friction) {
+    Fabric f;
+    f.density = density;
+    f.thickness = 0.001177;
+    f.membrane = {k_over_rho * density, k_over_rho * density, k_over_rho * density / 2.5};
+    f.bending = {b0, 30, 0.03, 0};
+    f.drag = drag;
+    f.friction = friction;
+    return f;
+  };
+  static const std::array<FabricPreset, 3> presets = {
+      FabricPreset{"kidnapped", "cloth of example 4.1(a), Peng & Zheng 2022", make(100, 0.117, 0.351, 3.3e-3, 0.3)},
+      FabricPreset{"armor", "soft armor of example 4.2(a)", make(50, 0.1177, 0.353, 1e-4, 0.2)},
+      FabricPreset{"skirt", "skirt of example 4.3(a)", make(50, 0.118, 0.354, 1e-5, 0.8)},
+  };
+  return presets;
+}
+
+}  // namespace toile
