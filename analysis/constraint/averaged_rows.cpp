@@ -29,19 +29,19 @@ struct RowSum {
 };
 
 // Of the cloth at a quadrature point.
-double area_at(const ShellPanel& panel, int point) {
+double area_at(const ClothPanel& panel, int point) {
   const Eigen::Vector2d& uv = panel.quadrature.points[point];
   return panel.quadrature.weights[point] * evaluate(panel.rest, uv.x(), uv.y()).area_scale();
 }
 
-double material_area(const ShellPanel& panel, const CellRule& cell) {
+double material_area(const ClothPanel& panel, const CellRule& cell) {
   double area = 0;
   for (int k = cell.first; k < cell.first + cell.count; ++k) area += area_at(panel, k);
   return area;
 }
 
-std::vector<StrainRow> cell_averages(const ShellModel& model, int index) {
-  const ShellPanel& panel = model.panels()[index];
+std::vector<StrainRow> cell_averages(const Body& body, int index) {
+  const ClothPanel& panel = body.panels()[index];
   std::vector<StrainRow> rows;
   for (const CellRule& cell : panel.quadrature.cells) {
     RowSum sums[2];
@@ -50,23 +50,23 @@ std::vector<StrainRow> cell_averages(const ShellModel& model, int index) {
     for (int k = cell.first; k < cell.first + cell.count; ++k) {
       const Eigen::Vector2d& uv = panel.quadrature.points[k];
       const double weight = area_at(panel, k);
-      const MaterialPoint point = model.material_point(index, uv.x(), uv.y());
+      const MaterialPoint point = body.material_point(index, uv.x(), uv.y());
       for (int d : {0, 1}) sums[d].add(point, 1 + d, weight);
       area += weight;
       middle += weight * uv;
     }
     middle /= area;
     for (int d : {0, 1}) {
-      const double length = apply(sums[d].over(1), model.rest()).norm();
+      const double length = apply(sums[d].over(1), body.rest()).norm();
       rows.push_back({sums[d].over(length), index, -1, d == 1, area, 0, 0, middle, Eigen::Vector2d::Unit(d)});
     }
   }
   return rows;
 }
 
-std::vector<StrainRow> springs(const ShellModel& model, int index, const TrimTopology& topology, const Closure& closure,
+std::vector<StrainRow> springs(const Body& body, int index, const TrimTopology& topology, const Closure& closure,
                                bool diagonals) {
-  const ShellPanel& panel = model.panels()[index];
+  const ClothPanel& panel = body.panels()[index];
   const KnotMesh& mesh = topology.mesh;
   const int nu = mesh.cells_u(), nv = mesh.cells_v();
   std::vector<double> cloth(static_cast<std::size_t>(nu) * nv, 0);
@@ -82,20 +82,20 @@ std::vector<StrainRow> springs(const ShellModel& model, int index, const TrimTop
   const auto add = [&](int ai, int aj, int bi, int bj, double area) {
     if (area == 0 || !there(ai, aj) || !there(bi, bj)) return;
     RowSum sum;
-    sum.add(model.material_point(index, mesh.u[bi], mesh.v[bj]), 0, 1);
-    sum.add(model.material_point(index, mesh.u[ai], mesh.v[aj]), 0, -1);
-    const Eigen::Vector3d along = apply(sum.over(1), model.rest());
+    sum.add(body.material_point(index, mesh.u[bi], mesh.v[bj]), 0, 1);
+    sum.add(body.material_point(index, mesh.u[ai], mesh.v[aj]), 0, -1);
+    const Eigen::Vector3d along = apply(sum.over(1), body.rest());
     const double length = along.norm();
     if (!(length > 0))
       throw GeometryError("panel '" + panel.name + "': a spring between (u, v) = (" + std::to_string(mesh.u[ai]) +
                           ", " + std::to_string(mesh.v[aj]) + ") and the next knot vertex has no length");
     const Eigen::Vector2d middle(0.5 * (mesh.u[ai] + mesh.u[bi]), 0.5 * (mesh.v[aj] + mesh.v[bj]));
-    const MaterialPoint frame = model.material_point(index, middle.x(), middle.y());
+    const MaterialPoint frame = body.material_point(index, middle.x(), middle.y());
     Eigen::Vector2d thread;
     for (int d : {0, 1}) {
       RowSum tangent;
       tangent.add(frame, 1 + d, 1);
-      thread[d] = apply(tangent.over(1), model.rest()).dot(along);
+      thread[d] = apply(tangent.over(1), body.rest()).dot(along);
     }
     thread.normalize();
     rows.push_back(
@@ -117,11 +117,11 @@ std::vector<StrainRow> springs(const ShellModel& model, int index, const TrimTop
 
 }  // namespace
 
-std::vector<StrainRow> averaged_rows(const ShellModel& model, int panel, const TrimTopology& topology,
-                                     const Closure& closure, PointRule rule) {
-  if (rule == PointRule::cell_average) return cell_averages(model, panel);
-  if (rule == PointRule::springs_quad) return springs(model, panel, topology, closure, false);
-  if (rule == PointRule::springs_triangle) return springs(model, panel, topology, closure, true);
+std::vector<StrainRow> averaged_rows(const Body& body, int panel, const TrimTopology& topology, const Closure& closure,
+                                     PointRule rule) {
+  if (rule == PointRule::cell_average) return cell_averages(body, panel);
+  if (rule == PointRule::springs_quad) return springs(body, panel, topology, closure, false);
+  if (rule == PointRule::springs_triangle) return springs(body, panel, topology, closure, true);
   return {};
 }
 

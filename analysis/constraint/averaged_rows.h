@@ -21,7 +21,7 @@ namespace toile {
 // their cell. Rows are hard.
 //   (1) C = 0 at rest; (2) springs over a seam of a closed surface are taken once.
 // Throws GeometryError where two neighbouring vertices are one place.
-std::vector<StrainRow> averaged_rows(const ShellModel& model, int panel, const TrimTopology& topology,
-                                     const Closure& closure, PointRule rule);
+std::vector<StrainRow> averaged_rows(const Body& body, int panel, const TrimTopology& topology, const Closure& closure,
+                                     PointRule rule);
 
 }  // namespace toile

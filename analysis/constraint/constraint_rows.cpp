@@ -31,7 +31,7 @@ ScalarRow make_row(const MaterialPoint& point, int which) {
 
 }  // namespace
 
-std::vector<StrainRow> strain_rows(const ShellModel& model, const AffineMap& map,
+std::vector<StrainRow> strain_rows(const Body& body, const AffineMap& map,
                                    const std::vector<std::vector<ConstraintPoint>>& points) {
   std::vector<StrainRow> rows;
   std::vector<ScalarRow> values;
@@ -39,24 +39,14 @@ std::vector<StrainRow> strain_rows(const ShellModel& model, const AffineMap& map
     for (int k = 0; k < static_cast<int>(points[panel].size()); ++k) {
       const ConstraintPoint& point = points[panel][k];
       if (!point.used) continue;
-      const MaterialPoint functions = model.material_point(panel, point.u, point.v);
+      const MaterialPoint functions = body.material_point(panel, point.u, point.v);
       const Eigen::Vector2d uv(point.u, point.v);
       rows.push_back({make_row(functions, 1), panel, k, false, 0, 0, 0, uv, {1, 0}});
       rows.push_back({make_row(functions, 2), panel, k, true, 0, 0, 0, uv, {0, 1}});
       values.insert(values.end(), 2, make_row(functions, 0));
     }
-  weigh_rows(model, map, values, rows);
+  weigh_rows(body, map, values, rows);
   return rows;
-}
-
-Eigen::Vector3d apply(const ScalarRow& row, const Eigen::Ref<const Eigen::VectorXd>& q) {
-  Eigen::Vector3d y = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * q.segment<3>(3 * row.index[k]);
-  return y;
-}
-
-ScalarRow place_row(const ShellModel& model, int panel, double u, double v) {
-  return make_row(model.material_point(panel, u, v), 0);
 }
 
 }  // namespace toile

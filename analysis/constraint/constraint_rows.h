@@ -8,18 +8,14 @@
 #include <vector>
 
 #include "analysis/map/affine_map.h"
-#include "analysis/shell/shell_model.h"
+#include "analysis/model/body.h"
 #include "trimming/constraint_points.h"
 
 namespace toile {
 
-// A row d over control points gives the vector y = sum_I d_I q_I.
+// Each has a row d over the body's points, which gives the vector y = sum_I d_I q_I.
 //   strain rows: d = N_,weft or N_,warp at a constraint point; C = (y.y - 1) / 2                 [eq. 36]
 //   place rows:  d = N at a pinned material point; C = y - target(t), three components, always an equality.
-struct ScalarRow {
-  std::vector<int> index;  // control points, ascending
-  std::vector<double> value;
-};
 struct StrainRow {
   ScalarRow row;
   int panel = 0;
@@ -45,13 +41,7 @@ struct ConstraintRows {
 // Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points()
 // gives them. Functions that vanish at a point (all but p per direction on a C1 knot line) are left out. Rows are hard;
 // their areas are those of weigh_rows().
-std::vector<StrainRow> strain_rows(const ShellModel& model, const AffineMap& map,
+std::vector<StrainRow> strain_rows(const Body& body, const AffineMap& map,
                                    const std::vector<std::vector<ConstraintPoint>>& points);
-
-// y = sum d_I q_I.
-Eigen::Vector3d apply(const ScalarRow& row, const Eigen::Ref<const Eigen::VectorXd>& q);
-
-// The row of one material point's place, for pins.
-ScalarRow place_row(const ShellModel& model, int panel, double u, double v);
 
 }  // namespace toile

@@ -40,15 +40,15 @@ Matrix matrix_of(const std::vector<Row>& rows, int control_points, auto scalar_r
 }
 
 // Integrals over the cloth of 1, N_,weft and N_,warp per control point: columns area share, weft, warp.
-Eigen::MatrixX3d integrals(const ShellModel& model) {
-  Eigen::MatrixX3d sum = Eigen::MatrixX3d::Zero(model.control_point_count(), 3);
-  for (std::size_t k = 0; k < model.panels().size(); ++k) {
-    const ShellPanel& panel = model.panels()[k];
+Eigen::MatrixX3d integrals(const Body& body) {
+  Eigen::MatrixX3d sum = Eigen::MatrixX3d::Zero(body.point_count(), 3);
+  for (std::size_t k = 0; k < body.panels().size(); ++k) {
+    const ClothPanel& panel = body.panels()[k];
     for (std::size_t p = 0; p < panel.quadrature.points.size(); ++p) {
       const Eigen::Vector2d& uv = panel.quadrature.points[p];
       const SurfaceJet jet = evaluate(panel.rest, uv.x(), uv.y());
       const double area = panel.quadrature.weights[p] * jet.area_scale();
-      const MaterialPoint point = model.material_point(static_cast<int>(k), uv.x(), uv.y());
+      const MaterialPoint point = body.material_point(static_cast<int>(k), uv.x(), uv.y());
       for (std::size_t i = 0; i < point.index.size(); ++i)
         for (int c = 0; c < 3; ++c) sum(point.index[i], c) += area * point.value[c][i];
     }
@@ -87,12 +87,12 @@ Eigen::VectorXd damped_least_squares(const Matrix& a, const Eigen::VectorXd& c, 
 
 }  // namespace
 
-void weigh_rows(const ShellModel& model, const AffineMap& map, const std::vector<ScalarRow>& values,
+void weigh_rows(const Body& body, const AffineMap& map, const std::vector<ScalarRow>& values,
                 std::vector<StrainRow>& rows, const RowAreaOptions& options) {
   if (rows.empty()) return;
-  const int n = model.control_point_count();
+  const int n = body.point_count();
   const Matrix nodes = all_nodes(map);
-  const Eigen::MatrixX3d whole = nodes.transpose() * integrals(model);
+  const Eigen::MatrixX3d whole = nodes.transpose() * integrals(body);
   for (const bool warp : {false, true}) {
     std::vector<std::size_t> members;
     for (std::size_t r = 0; r < rows.size(); ++r)
@@ -107,7 +107,7 @@ void weigh_rows(const ShellModel& model, const AffineMap& map, const std::vector
       const Matrix::InnerIterator e(equations, equation);
       return e ? rows[members[static_cast<std::size_t>(e.col())]].panel : -1;
     };
-    std::vector<double> longest(model.panels().size(), 0);
+    std::vector<double> longest(body.panels().size(), 0);
     for (int i = 0; i < equations.rows(); ++i)
       if (const int panel = panel_of(i); panel >= 0) longest[panel] = std::max(longest[panel], equations.row(i).norm());
     for (int i = 0; i < equations.rows(); ++i) {
@@ -119,7 +119,7 @@ void weigh_rows(const ShellModel& model, const AffineMap& map, const std::vector
     const Eigen::VectorXd factor =
         (1 + damped_least_squares(equations, missing, options).array()).max(options.least).min(options.most);
     // What the bounds take or give is made up for by all rows of the panel alike.
-    std::vector<double> shared(model.panels().size(), 0), weighed(shared);
+    std::vector<double> shared(body.panels().size(), 0), weighed(shared);
     for (std::size_t k = 0; k < members.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       StrainRow& row = rows[members[k]];
@@ -130,7 +130,7 @@ void weigh_rows(const ShellModel& model, const AffineMap& map, const std::vector
     for (const std::size_t r : members)
       if (weighed[rows[r].panel] > 0) rows[r].area *= shared[rows[r].panel] / weighed[rows[r].panel];
   }
-  std::vector<double> sum(model.panels().size(), 0), count(sum);
+  std::vector<double> sum(body.panels().size(), 0), count(sum);
   for (const StrainRow& row : rows) {
     sum[row.panel] += row.area;
     ++count[row.panel];

@@ -24,7 +24,7 @@ struct RowAreaOptions {
   double damping = 1e-3;         // of a panel's longest equation: weights that are hardly told stay shares
   int iterations = 200;          // at most: what is not told by then stays near the shares
 };
-void weigh_rows(const ShellModel& model, const AffineMap& map, const std::vector<ScalarRow>& values,
+void weigh_rows(const Body& body, const AffineMap& map, const std::vector<ScalarRow>& values,
                 std::vector<StrainRow>& rows, const RowAreaOptions& options = {});
 
 }  // namespace toile

@@ -103,14 +103,14 @@ void merge_near_points(const NurbsSurface& surface, std::vector<ConstraintPoint>
     }
 }
 
-std::vector<StrainRow> select_rows(const ShellModel& model, const AffineMap& map,
+std::vector<StrainRow> select_rows(const Body& body, const AffineMap& map,
                                    std::vector<std::vector<ConstraintPoint>>& points,
                                    const std::vector<PlaceRow>& place, const std::vector<StrainRow>& means) {
   check_places(map, place);
   for (std::size_t panel = 0; panel < points.size(); ++panel)
-    merge_near_points(model.panels()[panel].rest, points[panel]);
+    merge_near_points(body.panels()[panel].rest, points[panel]);
 
-  std::vector<StrainRow> all = strain_rows(model, map, points);
+  std::vector<StrainRow> all = strain_rows(body, map, points);
   all.insert(all.end(), means.begin(), means.end());
   const ComposedRows composed = compose(map, {all, {}});
   const auto moves = [&](std::size_t r) { return composed.free.start[r] < composed.free.start[r + 1]; };

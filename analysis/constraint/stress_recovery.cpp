@@ -3,13 +3,13 @@
 
 namespace toile {
 
-std::vector<ThreadStress> row_stress(const ShellModel& model, const ConstraintRows& rows,
+std::vector<ThreadStress> row_stress(const Body& body, const ConstraintRows& rows,
                                      const Eigen::Ref<const Eigen::VectorXd>& row_force,
                                      const Eigen::Ref<const Eigen::VectorXd>& q) {
   std::vector<ThreadStress> out;
   for (std::size_t r = 0; r < rows.strain.size(); ++r) {
     const StrainRow& row = rows.strain[r];
-    const ShellState fabric = model.state(row.panel, row.uv.x(), row.uv.y(), q);
+    const MaterialState fabric = body.state(row.panel, row.uv.x(), row.uv.y(), q);
     const double limit = row_force[static_cast<Eigen::Index>(r)] / row.area;
     const Eigen::Vector2d share = row.thread.cwiseAbs2();
     out.push_back(
@@ -18,12 +18,12 @@ std::vector<ThreadStress> row_stress(const ShellModel& model, const ConstraintRo
   return out;
 }
 
-StressField::StressField(const ShellModel& model, const ConstraintRows& rows, const std::vector<ThreadStress>& stress)
-    : model_(model) {
-  sums_.fill(Eigen::Matrix3Xd::Zero(3, model.control_point_count()));
+StressField::StressField(const Body& body, const ConstraintRows& rows, const std::vector<ThreadStress>& stress)
+    : body_(body) {
+  sums_.fill(Eigen::Matrix3Xd::Zero(3, body.point_count()));
   for (std::size_t r = 0; r < rows.strain.size(); ++r) {
     const StrainRow& row = rows.strain[r];
-    const MaterialPoint point = model.material_point(row.panel, row.uv.x(), row.uv.y());
+    const MaterialPoint point = body.material_point(row.panel, row.uv.x(), row.uv.y());
     for (std::size_t k = 0; k < point.index.size(); ++k)
       sums_[row.warp ? 1 : 0].col(point.index[k]) +=
           row.area * point.value[0][k] * Eigen::Vector3d(1, stress[r].second_pk, stress[r].nominal);
@@ -32,7 +32,7 @@ StressField::StressField(const ShellModel& model, const ConstraintRows& rows, co
 
 std::array<ThreadStress, 2> StressField::at(int panel, double u, double v,
                                             const Eigen::Ref<const Eigen::VectorXd>& q) const {
-  const MaterialPoint point = model_.material_point(panel, u, v);
+  const MaterialPoint point = body_.material_point(panel, u, v);
   std::array<ThreadStress, 2> out;
   for (std::size_t d = 0; d < 2; ++d) {
     double reached = 0;
@@ -48,7 +48,7 @@ std::array<ThreadStress, 2> StressField::at(int panel, double u, double v,
       out[d].second_pk /= reached;
       out[d].nominal /= reached;
     } else {
-      const ShellState fabric = model_.state(panel, u, v, q);
+      const MaterialState fabric = body_.state(panel, u, v, q);
       const auto c = static_cast<Eigen::Index>(d);
       out[d] = {fabric.second_pk[c], fabric.nominal[c]};
     }

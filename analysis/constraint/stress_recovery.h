@@ -21,7 +21,7 @@ struct ThreadStress {
 // lambda times the stretch along which they acted. A multiplier is the stress times the quadrature weight that
 // equilibrium gives the row (2/3 and 4/3 of a cell in turns at p = 2): over an area that is no such weight it has
 // stripes. weigh_rows() makes it one as far as weights can be.
-std::vector<ThreadStress> row_stress(const ShellModel& model, const ConstraintRows& rows,
+std::vector<ThreadStress> row_stress(const Body& body, const ConstraintRows& rows,
                                      const Eigen::Ref<const Eigen::VectorXd>& row_force,
                                      const Eigen::Ref<const Eigen::VectorXd>& q);
 
@@ -31,12 +31,12 @@ std::vector<ThreadStress> row_stress(const ShellModel& model, const ConstraintRo
 //   (3) springs on a net turned against the threads, and diagonal ones, count for the thread that is nearer.
 class StressField {
  public:
-  StressField(const ShellModel& model, const ConstraintRows& rows, const std::vector<ThreadStress>& stress);
+  StressField(const Body& body, const ConstraintRows& rows, const std::vector<ThreadStress>& stress);
   // Weft, warp at a material point; the fabric's own at q where no control point around has a row.
   std::array<ThreadStress, 2> at(int panel, double u, double v, const Eigen::Ref<const Eigen::VectorXd>& q) const;
 
  private:
-  const ShellModel& model_;
+  const Body& body_;
   // Per direction and control point of all panels: sum of weights, and the weighted stresses.
   std::array<Eigen::Matrix3Xd, 2> sums_;
 };

@@ -274,7 +274,7 @@ class Analysis {
 struct Cholesky::Impl {
   std::unique_ptr<Envelope> envelope;
   std::unique_ptr<SupernodalFactor> supernodal;
-  std::shared_ptr<Workers> workers;
+  Workers* workers = nullptr;
   std::size_t values = 0, nonzeros = 0;
   double operations = 0;
 };
@@ -300,16 +300,15 @@ Cholesky& Cholesky::operator=(Cholesky&&) noexcept = default;
 
 bool Cholesky::factorise(std::span<const double> values) {
   assert(values.size() == impl_->values);
-  return impl_->envelope ? impl_->envelope->factorise(values)
-                         : impl_->supernodal->factorise(values, impl_->workers.get());
+  return impl_->envelope ? impl_->envelope->factorise(values) : impl_->supernodal->factorise(values, impl_->workers);
 }
 
 void Cholesky::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) {
-  impl_->envelope ? impl_->envelope->solve(rhs, x) : impl_->supernodal->solve(rhs, x, impl_->workers.get());
+  impl_->envelope ? impl_->envelope->solve(rhs, x) : impl_->supernodal->solve(rhs, x, impl_->workers);
 }
 
-void Cholesky::use_threads(std::shared_ptr<Workers> workers) {
-  impl_->workers = std::move(workers);
+void Cholesky::use_threads(Workers* workers) {
+  impl_->workers = workers;
 }
 
 std::size_t Cholesky::factor_nonzeros() const {

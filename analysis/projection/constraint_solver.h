@@ -70,7 +70,7 @@ class ConstraintSolver {
   virtual bool restore(const ProjectionMemory& memory) = 0;
 
   // Steps by these threads from now on: the same bits. Null: the caller's alone.
-  virtual void use_threads(std::shared_ptr<Workers> workers) = 0;
+  virtual void use_threads(Workers* workers) = 0;
 
   virtual const ConstraintRows& rows() const = 0;
   virtual std::size_t factor_nonzeros() const = 0;

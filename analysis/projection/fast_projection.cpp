@@ -60,7 +60,7 @@ struct FastProjection::Impl {
   SparsePattern pattern;
   std::vector<double> gram, values;  // per entry of the pattern
   std::unique_ptr<Cholesky> factor;
-  std::shared_ptr<Workers> workers;  // null: one thread
+  Workers* workers = nullptr;  // null: one thread
 
   Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
   Eigen::VectorXd scale, residual, rhs, solution, candidate;
@@ -98,7 +98,7 @@ struct FastProjection::Impl {
 
   template <class Body>
   void share_out(int count, const Body& body) {
-    toile::share_out(workers.get(), count, body);
+    toile::share_out(workers, count, body);
   }
 
   void build(const Eigen::VectorXd& node_mass);
@@ -231,7 +231,7 @@ Violation FastProjection::Impl::measure_strain(int begin, int end) {
 }
 
 void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
-  share_pieces(workers.get(), strains(), [&](int index, int begin, int end) {
+  share_pieces(workers, strains(), [&](int index, int begin, int end) {
     evaluate(composed, x, fixed_places, begin, end, y);
     worst_of_piece[static_cast<std::size_t>(index)] = measure_strain(begin, end);
   });
@@ -462,9 +462,9 @@ ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
   return report;
 }
 
-void FastProjection::use_threads(std::shared_ptr<Workers> workers) {
+void FastProjection::use_threads(Workers* workers) {
   if (impl_->factor) impl_->factor->use_threads(workers);
-  impl_->workers = std::move(workers);
+  impl_->workers = workers;
 }
 
 ProjectionReport FastProjection::measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {

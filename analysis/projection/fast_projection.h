@@ -73,7 +73,7 @@ class FastProjection final : public ConstraintSolver {
   const Eigen::Matrix3Xd& strain_impulses() const override;
   ProjectionMemory memory() const override;
   bool restore(const ProjectionMemory& memory) override;
-  void use_threads(std::shared_ptr<Workers> workers) override;
+  void use_threads(Workers* workers) override;
   const ConstraintRows& rows() const override;
   const ProjectionOptions& options() const;
   std::size_t factor_nonzeros() const override;

@@ -80,7 +80,7 @@ struct LagrangeNewton::Impl {
   double first_strain = 0;                          // largest |C| of the candidate
   ProjectionMemory memory;
   std::unique_ptr<FastProjection> projection;  // made where Newton's method fails first
-  std::shared_ptr<Workers> workers;            // of the factor and the projection; null: one thread
+  Workers* workers = nullptr;                  // of the factor and the projection; null: one thread
 
   Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, ConstraintRows r, const ProjectionOptions& o)
       : map(m),
@@ -338,10 +338,10 @@ bool LagrangeNewton::restore(const ProjectionMemory& memory) {
   now = memory;
   return true;
 }
-void LagrangeNewton::use_threads(std::shared_ptr<Workers> workers) {
+void LagrangeNewton::use_threads(Workers* workers) {
   if (impl_->factor) impl_->factor->use_threads(workers);
   if (impl_->projection) impl_->projection->use_threads(workers);
-  impl_->workers = std::move(workers);
+  impl_->workers = workers;
 }
 const ConstraintRows& LagrangeNewton::rows() const {
   return impl_->rows;

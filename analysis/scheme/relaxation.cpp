@@ -12,8 +12,8 @@ constexpr double smaller_share = 0.7, smallest_share = 0.1;
 constexpr int least_window = 50, least_trial = 500, windows_at_least = 10;  // of the run so far
 
 // Largest distance between control points that carry cloth.
-double largest_move(const DynamicSystem& system, const Eigen::VectorXd& from, const Eigen::VectorXd& to) {
-  const Eigen::VectorXd& mass = system.model->lumped_mass();
+double largest_move(const MechanicalSystem& system, const Eigen::VectorXd& from, const Eigen::VectorXd& to) {
+  const Eigen::VectorXd& mass = system.body->lumped_mass();
   double squared = 0;
   for (Eigen::Index i = 0; i < mass.size(); ++i)
     if (mass[i] > 0) squared = std::max(squared, (to.segment<3>(3 * i) - from.segment<3>(3 * i)).squaredNorm());
@@ -36,7 +36,7 @@ void restart(Relaxation& r) {
   r.from.resize(0);
 }
 
-bool relax(const DynamicSystem& system, const StepWork& work, const StepReport& report, double tolerance,
+bool relax(const MechanicalSystem& system, const StepWork& work, const StepReport& report, double tolerance,
            DynamicState& state, Relaxation& r) {
   if (r.from.size() == 0) begin(r, false, work.other.q);
   ++r.steps;

@@ -35,7 +35,7 @@ struct Relaxation {
 
 // Judges the step that led to `state` and halts the cloth where the kinetic energy fell: the next step starts from rest
 // (v_half = 0, constraints at work). `work` and `report` are of that step. Returns whether it halted.
-bool relax(const DynamicSystem& system, const StepWork& work, const StepReport& report, double tolerance,
+bool relax(const MechanicalSystem& system, const StepWork& work, const StepReport& report, double tolerance,
            DynamicState& state, Relaxation& relaxation);
 
 // Begins the judgement anew, as after a pin was released or moved.

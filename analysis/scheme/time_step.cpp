@@ -57,8 +57,8 @@ double largest_pair(const Eigen::Ref<const Eigen::VectorXd>& diagonal, const Eig
 
 // Lanczos with full reorthogonalisation on M^-1/2 T^T K T M^-1/2: the residual of the largest Ritz pair bounds its
 // distance to an eigenvalue, the largest one for all but unlucky starts. [Parlett 1998, ch. 13]
-TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                              const Eigen::VectorXd& q) {
+TimeStepBound time_step_bound(const Model& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
+                              const Eigen::VectorXd& q, Workers* workers) {
   TimeStepBound bound;
   bound.dt = std::numeric_limits<double>::infinity();
   const int nodes = map.nodes();
@@ -70,6 +70,7 @@ TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, con
                         std::to_string(node_mass[k]) + " kg");
   const Eigen::VectorXd scale = node_mass.cwiseSqrt().cwiseInverse().replicate(1, 3).transpose().reshaped();
 
+  const std::vector<const Potential*> potentials = model.potentials();
   const int steps = static_cast<int>(std::min<Eigen::Index>(max_iterations, n));
   Eigen::MatrixXd basis(n, steps);
   Eigen::VectorXd alpha(steps), beta(steps), ritz_vector, dx(n), dq(3 * map.control_points()), df(dq.size()), image(n);
@@ -79,8 +80,10 @@ TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, con
   for (int k = 0; k < steps; ++k) {
     dx = scale.cwiseProduct(basis.col(k));
     apply_free_part(map, dx, dq);
-    model.apply_tangent(q, dq, df);
+    df.setZero();
+    for (const Potential* potential : potentials) potential->add_force_change(q, dq, df, TangentKind::upper, workers);
     map.reduce(df, image);
+    image = -image;
     image.array() *= scale.array();
     if (!image.allFinite()) throw SolverError("no time step: the stiffness of this state is not finite");
     alpha[k] = basis.col(k).dot(image);
@@ -103,7 +106,7 @@ TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, con
   bound.dt = 2 / std::sqrt(bound.eigenvalue);
   dx = scale.cwiseProduct(basis.leftCols(used) * ritz_vector);
   apply_free_part(map, dx, dq);
-  const ShellModel::CellShare share = model.stiffest_cell(q, dq);
+  const CellShare share = model.stiffest_cell(q, dq);
   bound.cell = share.cell;
   bound.bending = share.bending > share.membrane;
   return bound;

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "analysis/map/affine_map.h"
-#include "analysis/shell/shell_model.h"
+#include "analysis/model/model.h"
 
 namespace toile {
 
@@ -11,14 +11,14 @@ struct TimeStepBound {
   double dt = 0;            // s: 2 / sqrt(eigenvalue bound), without safety factor; infinite without stiffness
   double eigenvalue = 0;    // 1/s2, upper bound
   double relative_gap = 0;  // bound over Ritz value, minus 1
-  ShellModel::Cell cell;    // the cell that limits it: largest share of the mode's energy
+  Cell cell;                // the cell that limits it: largest share of the mode's energy
   bool bending = false;     // whether bending rather than membrane stiffness dominates there
 };
 
 // Of the undamped, unprojected model at q, with the slope of the bending law at q's curvatures: a state that unbends
 // gets stiffer, so a run asks again. Cost: 20 to 60 applications of the tangent. Deterministic. Throws SolverError
 // naming the node where a mass is not positive, or where the stiffness at q is not finite.
-TimeStepBound time_step_bound(const ShellModel& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                              const Eigen::VectorXd& q);
+TimeStepBound time_step_bound(const Model& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
+                              const Eigen::VectorXd& q, Workers* workers = nullptr);
 
 }  // namespace toile

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <utility>
 
 #include "analysis/parallel/workers.h"
@@ -14,20 +13,20 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
-// f_int + f_ext on control points.
-ShellEnergy total_force(const DynamicSystem& system, const Vector& q, Vector& f) {
+// f_int + f_ext on the body's points.
+Elastic total_force(const MechanicalSystem& system, const Vector& q, Vector& f) {
   f.resize(q.size());
-  const ShellEnergy elastic = system.model->internal_force(q, f);
+  const Elastic elastic = internal_force(system.potentials, q, f, system.workers);
   f += system.loads.force;
   return elastic;
 }
 
 // M a + C (v + h (a + constraint) - wind) = f, with h = 0 for an explicit start.
-void acceleration(const DynamicSystem& system, const Vector& q_force, const Vector& v, const Vector& constraint,
+void acceleration(const MechanicalSystem& system, const Vector& q_force, const Vector& v, const Vector& constraint,
                   double h, Vector& a) {
   a.resize(3 * system.map->nodes());
-  system.map->reduce(q_force, a, system.model->workers().get());
-  share_out(system.model->workers().get(), system.map->nodes(), [&](int begin, int end) {
+  system.map->reduce(q_force, a, system.workers);
+  share_out(system.workers, system.map->nodes(), [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       const double m = system.node_mass[k], c = system.node_drag[k];
       const Eigen::Vector3d known = v.segment<3>(3 * k) + h * constraint.segment<3>(3 * k);
@@ -41,7 +40,7 @@ void add(const ScalarRow& row, const Eigen::Vector3d& force, Vector& f) {
 }
 
 // Adds the constraints' forces to f (control points); `place`: those of the place rows.
-void add_constraint_forces(const DynamicSystem& system, double dt, Vector& f, Eigen::Matrix3Xd& place) {
+void add_constraint_forces(const MechanicalSystem& system, double dt, Vector& f, Eigen::Matrix3Xd& place) {
   if (!system.projection) {
     place.resize(3, 0);
     return;
@@ -63,7 +62,7 @@ void add_constraint_forces(const DynamicSystem& system, double dt, Vector& f, Ei
 }
 
 // Work that moved pins do on the cloth between two states: their force against what the cloth pulls, trapezoidal.
-double motion_work(const DynamicSystem& system, const DynamicState& from, const DynamicState& to, StepWork& work) {
+double motion_work(const MechanicalSystem& system, const DynamicState& from, const DynamicState& to, StepWork& work) {
   const AffineMap& map = *system.map;
   const auto moved = [&](int i) -> Eigen::Vector3d { return to.q.segment<3>(3 * i) - from.q.segment<3>(3 * i); };
   const auto target_moved = [&](const PlaceRow& row) -> Eigen::Vector3d {
@@ -88,27 +87,26 @@ double motion_work(const DynamicSystem& system, const DynamicState& from, const 
 
 }  // namespace
 
-void initialise(const DynamicSystem& system, DynamicState& state) {
+void initialise(const MechanicalSystem& system, DynamicState& state) {
   state.q.resize(3 * system.map->control_points());
   system.map->expand(state.x, state.t, state.q);
   total_force(system, state.q, state.f);
   acceleration(system, state.f, state.v, Vector::Zero(state.v.size()), 0, state.a);
 }
 
-StepReport step(const DynamicSystem& system, DynamicState& state, double dt) {
+StepReport step(const MechanicalSystem& system, DynamicState& state, double dt) {
   StepWork work;
   return step(system, state, dt, work);
 }
 
-StepReport step(const DynamicSystem& system, DynamicState& state, double dt, StepWork& work) {
+StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, StepWork& work) {
   StepReport report;
   report.dt = dt;
-  const std::shared_ptr<Workers> workers = system.model->workers();
   const int nodes = system.map->nodes();
   DynamicState& next = work.other;
   next.t = state.t + dt;
   for (Vector* v : {&work.candidate, &work.move, &work.constraint, &next.x, &next.v}) v->resize(state.x.size());
-  share_pieces(workers.get(), nodes, [&](int, int begin, int end) {
+  share_pieces(system.workers, nodes, [&](int, int begin, int end) {
     const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
     piece(work.candidate) = piece(state.x) + dt * piece(state.v) + (0.5 * dt * dt) * piece(state.a);
     piece(next.x) = piece(work.candidate);
@@ -122,7 +120,7 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
     report.projection_seconds = since(start);
   }
   Vector& v_half = next.v;  // becomes the velocity at the end
-  share_pieces(workers.get(), nodes, [&](int, int begin, int end) {
+  share_pieces(system.workers, nodes, [&](int, int begin, int end) {
     const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
     piece(work.move) = piece(next.x) - piece(state.x);
     piece(work.constraint) = (piece(next.x) - piece(work.candidate)) / (dt * dt);
@@ -131,7 +129,7 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
 
   next.q.resize(3 * system.map->control_points());
   system.map->fixed_places(next.t, work.fixed_places);
-  system.map->expand(next.x, work.fixed_places, next.q, workers.get());
+  system.map->expand(next.x, work.fixed_places, next.q, system.workers);
   const Clock::time_point start = Clock::now();
   report.elastic = total_force(system, next.q, next.f);
   report.force_seconds = since(start);
@@ -139,7 +137,7 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
 
   const int control_points = system.map->control_points();
   work.sums.assign(static_cast<std::size_t>(pieces(control_points)), {});
-  share_pieces(workers.get(), nodes, [&](int index, int begin, int end) {
+  share_pieces(system.workers, nodes, [&](int index, int begin, int end) {
     StepWork::Sums sums;
     for (int k = begin; k < end; ++k) {
       const auto move = work.move.segment<3>(3 * k), held = work.constraint.segment<3>(3 * k);
@@ -156,7 +154,7 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
     }
     work.sums[static_cast<std::size_t>(index)] = sums;
   });
-  share_pieces(workers.get(), control_points, [&](int index, int begin, int end) {
+  share_pieces(system.workers, control_points, [&](int index, int begin, int end) {
     const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
     work.sums[static_cast<std::size_t>(index)].load_work =
         piece(system.loads.force).dot(piece(next.q) - piece(state.q));
@@ -176,9 +174,8 @@ StepReport step(const DynamicSystem& system, DynamicState& state, double dt, Ste
   return report;
 }
 
-Reactions reactions(const DynamicSystem& system, const DynamicState& state, double dt) {
+Reactions reactions(const MechanicalSystem& system, const DynamicState& state, double dt) {
   const AffineMap& map = *system.map;
-  const ShellModel& model = *system.model;
   Vector f = state.f;
   Reactions out;
   add_constraint_forces(system, dt, f, out.place);
@@ -195,9 +192,9 @@ Reactions reactions(const DynamicSystem& system, const DynamicState& state, doub
       velocity += e.value() * state.v.segment<3>(3 * e.col());
     for (AffineMap::Matrix::InnerIterator e(map.fixed_part(), i); e; ++e) {
       velocity += e.value() * pin_velocity.col(e.col());
-      inertia += e.value() * model.lumped_mass()[i] * pin_acceleration.col(e.col());
+      inertia += e.value() * system.body->lumped_mass()[i] * pin_acceleration.col(e.col());
     }
-    const Eigen::Vector3d drag = -model.lumped_drag()[i] * (velocity - system.loads.wind);
+    const Eigen::Vector3d drag = -system.body->lumped_drag()[i] * (velocity - system.loads.wind);
     for (AffineMap::Matrix::InnerIterator e(map.fixed_part(), i); e; ++e)
       out.fixed.col(e.col()) += e.value() * (inertia - f.segment<3>(3 * i) - drag);
   }

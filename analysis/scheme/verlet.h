@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "analysis/map/affine_map.h"
+#include "analysis/model/model.h"
 #include "analysis/projection/constraint_solver.h"
-#include "analysis/shell/shell_model.h"
 
 namespace toile {
 
@@ -30,7 +30,7 @@ struct Loads {
 struct StepReport {
   double dt = 0;
   ProjectionReport projection;
-  ShellEnergy elastic;      // at the end
+  Elastic elastic;          // at the end
   double limit_energy = 0;  // J, of the strain limits at the end
   double kinetic = 0;       // J, in the middle of the step, where the velocity obeys the constraints
   double kinetic_end = 0;   // J, at the end; without projection only, whose forces the velocity there lacks
@@ -46,16 +46,18 @@ struct StepReport {
 // Masses and drag are the nodes'.
 
 // Everything a step needs that doesn't change from step to step. The caller keeps the parts alive.
-struct DynamicSystem {
-  const ShellModel* model = nullptr;
+struct MechanicalSystem {
+  const Body* body = nullptr;
+  std::vector<const Potential*> potentials;
   const AffineMap* map = nullptr;
   Eigen::VectorXd node_mass, node_drag;  // reduced lumped mass with floor [kg], drag [kg/s]
   Loads loads;
   ConstraintSolver* projection = nullptr;  // null: no limits and no place rows
+  Workers* workers = nullptr;              // null: the caller's thread alone
 };
 
 // Accelerations, control points and forces from places and velocities: for the start and after a change of the system.
-void initialise(const DynamicSystem& system, DynamicState& state);
+void initialise(const MechanicalSystem& system, DynamicState& state);
 
 // Advances state by dt. The velocity between the steps is (x_n+1 - x_n) / dt after projection; drag is implicit.
 //   x~ = x + dt v + dt^2/2 a, projected at t + dt;  v_half = (x_n+1 - x_n) / dt
@@ -74,8 +76,8 @@ struct StepWork {
   Eigen::VectorXd candidate, move, constraint, force;
   Eigen::Matrix3Xd fixed_places, place_force;
 };
-StepReport step(const DynamicSystem& system, DynamicState& state, double dt, StepWork& work);
-StepReport step(const DynamicSystem& system, DynamicState& state, double dt);
+StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, StepWork& work);
+StepReport step(const MechanicalSystem& system, DynamicState& state, double dt);
 
 // Force that each fixed control point and each place row exerts on the cloth [N] at the state's time, dt being the last
 // step's. A constraint's force is -J^T lambda / dt^2. Exact at rest: the sum balances the dead loads.
@@ -83,6 +85,6 @@ struct Reactions {
   Eigen::Matrix3Xd fixed;  // AffineMap::fixed order
   Eigen::Matrix3Xd place;  // place rows
 };
-Reactions reactions(const DynamicSystem& system, const DynamicState& state, double dt);
+Reactions reactions(const MechanicalSystem& system, const DynamicState& state, double dt);
 
 }  // namespace toile

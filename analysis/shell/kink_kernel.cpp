@@ -102,7 +102,7 @@ BendingTerms<double> response(const KinkStrip& strip, const PointLaw& law, doubl
 
 }  // namespace
 
-KinkStrip make_kink_strip(const ShellPanel& panel, int panel_number, int first_control_point, const KinkPoint& point) {
+KinkStrip make_kink_strip(const ClothPanel& panel, int panel_number, int first_control_point, const KinkPoint& point) {
   const bool is_u = point.direction == Direction::u;
   const NurbsSurface& rest = panel.rest;
   const KnotVector& across = rest.knots(point.direction);

@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Energy, force and tangent of the bending strip at one point of a kink (kink_strip.h).
+// C0 knot lines: the cloth goes on across them, so a bend there costs what bending a narrow strip of the same cloth
+// costs. [after the bending strips of Kiendl et al. 2010, with the angle itself in place of their fictitious surface]
 //
+// Per length of line: width * psi((theta - theta0) / width), theta the angle by which the tangent plane turns across
+// the line, theta0 at rest (0 where the fabric's rest curvature is), psi the fabric's bending energy for a curvature
+// across the line, width a tenth of the narrower neighbouring cell. No membrane, no mass.
+//
+// Here: energy, force and tangent at one point of a kink.
 //   a        derivative of the deformed place along the line, the same from both sides
 //   w-, w+   derivatives across the line at rest, from the side before and from the side after
 //   n-, n+   unit normals w x a / |w x a|;  theta = angle from n- to n+ about a
@@ -8,10 +14,14 @@
 
 #include <vector>
 
-#include "analysis/shell/kink_strip.h"
+#include "analysis/model/cloth_panel.h"
 #include "analysis/shell/point_kernel.h"
 
 namespace toile {
+
+// Width of the strip as part of the narrower neighbouring cell: a line makes the cloth softer by this part of a cell,
+// and where bending bounds the step, the bound falls to about a third. (analysis/README.md)
+constexpr double strip_width = 0.1;
 
 // One point with the functions that don't vanish there.
 struct KinkStrip {
@@ -24,7 +34,7 @@ struct KinkStrip {
 };
 
 // Throws GeometryError where the rest surface has no tangent plane on one of the sides.
-KinkStrip make_kink_strip(const ShellPanel& panel, int panel_number, int first_control_point, const KinkPoint& point);
+KinkStrip make_kink_strip(const ClothPanel& panel, int panel_number, int first_control_point, const KinkPoint& point);
 
 // Subtracts the gradient from `force` (of all control points); returns the energy [J].
 double add_kink_force(const KinkStrip& strip, const PointLaw& law, const double* q, double* force);

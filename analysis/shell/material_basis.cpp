@@ -9,7 +9,7 @@
 
 namespace toile {
 
-void evaluate_material_basis(const ShellPanel& panel, int span_u, int span_v, double u, double v, MaterialBasis& out) {
+void evaluate_material_basis(const ClothPanel& panel, int span_u, int span_v, double u, double v, MaterialBasis& out) {
   SurfaceBasis basis;
   evaluate_basis_on_span(panel.rest, span_u, span_v, u, v, basis);
   out.first_u = basis.first_u;

@@ -24,6 +24,6 @@ struct MaterialBasis {
 
 // At (u, v), on the named spans (knot indices). Throws GeometryError with panel and place where the rest surface has no
 // tangent plane.
-void evaluate_material_basis(const ShellPanel& panel, int span_u, int span_v, double u, double v, MaterialBasis& out);
+void evaluate_material_basis(const ClothPanel& panel, int span_u, int span_v, double u, double v, MaterialBasis& out);
 
 }  // namespace toile

@@ -37,7 +37,7 @@ struct CellGroup {
 
 // What the cells of a panel share.
 struct PanelLayout {
-  explicit PanelLayout(const ShellPanel& panel) : law(panel.fabric) {
+  explicit PanelLayout(const ClothPanel& panel) : law(panel.fabric) {
     const int count_u = panel.rest.u().degree() + 1, count_v = panel.rest.v().degree() + 1;
     for (int b = 0; b < count_v; ++b)
       for (int a = 0; a < count_u; ++a) offset.push_back(panel.rest.index(a, b));
@@ -350,13 +350,13 @@ Curvature<double> curvature(const PointJet<double>& x) {
 }
 
 // What counts as unbent.
-Curvature<double> natural_curvature(const ShellPanel& panel, const MaterialBasis& basis) {
+Curvature<double> natural_curvature(const ClothPanel& panel, const MaterialBasis& basis) {
   if (panel.fabric.rest_curvature == RestCurvature::zero) return {0, 0, 0};
   return curvature(jet_at(basis, panel.rest, panel.rest.points().data()));
 }
 
 // Points per direction of an uncut cell of polynomial functions, whose points are a grid; else 0 x 0.
-std::pair<int, int> tensor_shape(const ShellPanel& panel, const CellRule& cell) {
+std::pair<int, int> tensor_shape(const ClothPanel& panel, const CellRule& cell) {
   if (!cell.tensor || panel.rest.rational()) return {0, 0};
   const Eigen::Vector2d* points = panel.quadrature.points.data() + cell.first;
   int along_u = 1;
@@ -378,10 +378,8 @@ struct SharedWork {
     std::vector<int> point;          // control point of each addend that is kept, in order
     std::vector<double> addend;      // 3 each
   };
-  explicit SharedWork(int threads)
-      : workers(std::make_shared<Workers>(threads)),
-        parts(static_cast<std::size_t>(parts_per_thread * workers->count())) {}
-  std::shared_ptr<Workers> workers;
+  explicit SharedWork(int threads_) : threads(threads_), parts(static_cast<std::size_t>(parts_per_thread * threads_)) {}
+  int threads = 0;
   std::vector<Part> parts;
   std::vector<char> shared;                // per control point
   std::vector<PointEnergy<Lanes>> energy;  // per group
@@ -393,15 +391,17 @@ constexpr std::size_t least_points_for_threads = 8000;
 }  // namespace
 
 struct ShellModel::Impl {
-  std::vector<ShellPanel> panels;
+  explicit Impl(Data& of) : data(of), panels(of.panels), first(of.first) {}
+
+  Data& data;
+  const std::vector<ClothPanel>& panels;
+  const std::vector<int>& first;
   std::vector<PanelLayout> layouts;
-  std::vector<int> first;  // control point of each panel, and the total
   std::vector<CellGroup> groups;
   std::vector<Pack> tables;
   std::vector<KinkStrip> kinks;
-  Eigen::VectorXd rest, lumped_mass, lumped_drag;
   std::size_t point_count = 0;
-  std::unique_ptr<SharedWork> work;  // null: one thread
+  mutable std::unique_ptr<SharedWork> work;  // for the number of threads that came last
 
   void add_panel(int index);
   void fill(CellGroup& group);
@@ -414,8 +414,9 @@ struct ShellModel::Impl {
 
   // Subtracts each group's image(group, layout, table, local) from `out`; returns what the images return, summed.
   template <class Image>
-  PointEnergy<Lanes> subtract_images(double* out, const Image& image) const;
-  void share(int threads);
+  PointEnergy<Lanes> subtract_images(double* out, Workers* workers, const Image& image) const;
+  SharedWork& shared_by(int threads) const;
+  ShellEnergy subtract_gradient(const double* q, double* out, Workers* workers) const;
 
   // Calls body(group, layout, table) for every group in order.
   template <class Body>
@@ -425,7 +426,7 @@ struct ShellModel::Impl {
 };
 
 template <class Image>
-PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& image) const {
+PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, Workers* workers, const Image& image) const {
   PointEnergy<Lanes> total{};
   const auto add = [&](const PointEnergy<Lanes>& part) {
     total.membrane += part.membrane;
@@ -433,7 +434,7 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& i
     total.least = smaller(total.least, part.least);
     total.most = larger(total.most, part.most);
   };
-  if (!work) {
+  if (!workers || workers->count() < 2 || point_count < least_points_for_threads) {
     for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
       LocalNet local;
       add(image(group, layout, table, local));
@@ -441,7 +442,7 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& i
     });
     return total;
   }
-  SharedWork& w = *work;
+  SharedWork& w = shared_by(workers->count());
   const auto body = [&](int index) {
     SharedWork::Part& part = w.parts[static_cast<std::size_t>(index)];
     double* kept = part.addend.data();
@@ -456,7 +457,7 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& i
       });
     }
   };
-  w.workers->run(static_cast<int>(w.parts.size()), body);
+  workers->run(static_cast<int>(w.parts.size()), body);
   for (const SharedWork::Part& part : w.parts)
     for (std::size_t k = 0; k < part.point.size(); ++k)
       subtract(out, part.point[k], part.addend[3 * k], part.addend[3 * k + 1], part.addend[3 * k + 2]);
@@ -464,9 +465,8 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, const Image& i
   return total;
 }
 
-void ShellModel::Impl::share(int threads) {
-  work.reset();
-  if (threads < 2 || point_count < least_points_for_threads) return;
+SharedWork& ShellModel::Impl::shared_by(int threads) const {
+  if (work && work->threads == threads) return *work;
   work = std::make_unique<SharedWork>(threads);
   const int parts = static_cast<int>(work->parts.size());
   work->energy.resize(groups.size());
@@ -498,6 +498,7 @@ void ShellModel::Impl::share(int threads) {
       });
     part.addend.resize(3 * part.point.size());
   }
+  return *work;
 }
 
 void ShellModel::Impl::add_panel(int index) {
@@ -529,7 +530,7 @@ void ShellModel::Impl::add_panel(int index) {
 }
 
 void ShellModel::Impl::fill(CellGroup& group) {
-  const ShellPanel& panel = panels[group.panel];
+  const ClothPanel& panel = panels[group.panel];
   const PanelLayout& layout = layouts[group.panel];
   const std::vector<int> spans_u = panel.rest.u().spans(), spans_v = panel.rest.v().spans();
   MaterialBasis basis;
@@ -569,8 +570,8 @@ void ShellModel::Impl::fill(CellGroup& group) {
       ++point_count;
       for (int k = 0; k < layout.functions(); ++k) {
         const double share = area * basis.value[0][k];
-        lumped_mass[group.first[l] + layout.offset[k]] += panel.fabric.density * share;
-        lumped_drag[group.first[l] + layout.offset[k]] += panel.fabric.drag * share;
+        data.lumped_mass[group.first[l] + layout.offset[k]] += panel.fabric.density * share;
+        data.lumped_drag[group.first[l] + layout.offset[k]] += panel.fabric.drag * share;
       }
     }
   }
@@ -584,28 +585,28 @@ QuadratureOptions shell_quadrature(const NurbsSurface& surface) {
   return options;
 }
 
-ShellModel::ShellModel(std::vector<ShellPanel> panels) : impl_(std::make_unique<Impl>()) {
-  impl_->panels = std::move(panels);
-  impl_->first.push_back(0);
-  for (const ShellPanel& panel : impl_->panels) {
+ShellModel::ShellModel(std::vector<ClothPanel> panels)
+    : Model(std::make_unique<Data>()), impl_(std::make_unique<Impl>(*data_)) {
+  data_->panels = std::move(panels);
+  data_->first.push_back(0);
+  for (const ClothPanel& panel : data_->panels) {
     validate(panel.fabric);
     const int functions = (panel.rest.u().degree() + 1) * (panel.rest.v().degree() + 1);
     if (functions > SurfaceBasis::capacity)
       throw GeometryError("panel " + panel.name + ": degrees above 7 can't be simulated");
     impl_->layouts.emplace_back(panel);
-    impl_->first.push_back(impl_->first.back() + static_cast<int>(panel.rest.points().cols()));
+    data_->first.push_back(data_->first.back() + static_cast<int>(panel.rest.points().cols()));
   }
-  const int n = impl_->first.back();
-  impl_->rest.resize(3 * n);
-  impl_->lumped_mass = Eigen::VectorXd::Zero(n);
-  impl_->lumped_drag = Eigen::VectorXd::Zero(n);
-  for (int k = 0; k < static_cast<int>(impl_->panels.size()); ++k) {
-    const Eigen::Matrix3Xd& points = impl_->panels[k].rest.points();
-    impl_->rest.segment(3 * impl_->first[k], points.size()) = points.reshaped();
+  const int n = point_count();
+  data_->rest.resize(3 * n);
+  data_->lumped_mass = Eigen::VectorXd::Zero(n);
+  data_->lumped_drag = Eigen::VectorXd::Zero(n);
+  for (int k = 0; k < static_cast<int>(data_->panels.size()); ++k) {
+    const ClothPanel& panel = data_->panels[k];
+    data_->rest.segment(3 * first_point(k), panel.rest.points().size()) = panel.rest.points().reshaped();
     impl_->add_panel(k);
     if (!impl_->layouts[k].law.bends()) continue;
-    for (const KinkPoint& point : impl_->panels[k].kinks)
-      impl_->kinks.push_back(make_kink_strip(impl_->panels[k], k, impl_->first[k], point));
+    for (const KinkPoint& point : panel.kinks) impl_->kinks.push_back(make_kink_strip(panel, k, first_point(k), point));
   }
 }
 
@@ -613,30 +614,6 @@ ShellModel::~ShellModel() = default;
 ShellModel::ShellModel(ShellModel&&) noexcept = default;
 ShellModel& ShellModel::operator=(ShellModel&&) noexcept = default;
 
-int ShellModel::control_point_count() const {
-  return impl_->first.back();
-}
-const std::vector<ShellPanel>& ShellModel::panels() const {
-  return impl_->panels;
-}
-int ShellModel::first_control_point(int panel) const {
-  return impl_->first[panel];
-}
-const Eigen::VectorXd& ShellModel::rest() const {
-  return impl_->rest;
-}
-const Eigen::VectorXd& ShellModel::lumped_mass() const {
-  return impl_->lumped_mass;
-}
-const Eigen::VectorXd& ShellModel::lumped_drag() const {
-  return impl_->lumped_drag;
-}
-void ShellModel::use_threads(int count) {
-  impl_->share(count);
-}
-std::shared_ptr<Workers> ShellModel::workers() const {
-  return impl_->work ? impl_->work->workers : nullptr;
-}
 std::size_t ShellModel::quadrature_points() const {
   return impl_->point_count;
 }
@@ -644,17 +621,13 @@ std::size_t ShellModel::table_bytes() const {
   return impl_->tables.size() * sizeof(Pack);
 }
 
-ShellEnergy ShellModel::internal_force(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                       Eigen::Ref<Eigen::VectorXd> force) const {
-  assert(q.size() == impl_->rest.size() && force.size() == q.size());
-  force.setZero();
-  const PointEnergy<Lanes> total = impl_->subtract_images(
-      force.data(), [&](const CellGroup& group, const PanelLayout& layout, const Pack* table, LocalNet& local) {
-        return group_gradient(group, layout, table, q.data(), local);
+ShellEnergy ShellModel::Impl::subtract_gradient(const double* q, double* out, Workers* workers) const {
+  const PointEnergy<Lanes> total = subtract_images(
+      out, workers, [&](const CellGroup& group, const PanelLayout& layout, const Pack* table, LocalNet& local) {
+        return group_gradient(group, layout, table, q, local);
       });
   double strips = 0;
-  for (const KinkStrip& strip : impl_->kinks)
-    strips += add_kink_force(strip, impl_->layouts[strip.panel].law, q.data(), force.data());
+  for (const KinkStrip& strip : kinks) strips += add_kink_force(strip, layouts[strip.panel].law, q, out);
   ShellEnergy energy{sum(total.membrane), sum(total.bending) + strips};
   for (int l = 0; l < lane_count; ++l) {
     energy.least_strain = std::min(energy.least_strain, total.least[l]);
@@ -663,21 +636,44 @@ ShellEnergy ShellModel::internal_force(const Eigen::Ref<const Eigen::VectorXd>& 
   return energy;
 }
 
-void ShellModel::apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
-                               Eigen::Ref<Eigen::VectorXd> df, TangentKind kind) const {
-  assert(q.size() == impl_->rest.size() && dq.size() == q.size() && df.size() == q.size());
-  df.setZero();
-  impl_->subtract_images(df.data(),
+ShellEnergy ShellModel::internal_force(const Eigen::Ref<const Eigen::VectorXd>& q, Eigen::Ref<Eigen::VectorXd> force,
+                                       Workers* workers) const {
+  assert(q.size() == rest().size() && force.size() == q.size());
+  force.setZero();
+  return impl_->subtract_gradient(q.data(), force.data(), workers);
+}
+
+void ShellModel::add_force(const Eigen::Ref<const Eigen::VectorXd>& q, Eigen::Ref<Eigen::VectorXd> force,
+                           Elastic& elastic, Workers* workers) const {
+  assert(q.size() == rest().size() && force.size() == q.size());
+  const ShellEnergy energy = impl_->subtract_gradient(q.data(), force.data(), workers);
+  elastic.energy.add("membrane", energy.membrane);
+  elastic.energy.add("bending", energy.bending);
+  elastic.strain.least = std::min(elastic.strain.least, energy.least_strain);
+  elastic.strain.largest = std::max(elastic.strain.largest, energy.largest_strain);
+}
+
+void ShellModel::add_force_change(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                  const Eigen::Ref<const Eigen::VectorXd>& dq, Eigen::Ref<Eigen::VectorXd> df,
+                                  TangentKind kind, Workers* workers) const {
+  assert(q.size() == rest().size() && dq.size() == q.size() && df.size() == q.size());
+  impl_->subtract_images(df.data(), workers,
                          [&](const CellGroup& group, const PanelLayout& layout, const Pack* table, LocalNet& local) {
                            return group_tangent(group, layout, kind, table, q.data(), dq.data(), local);
                          });
   for (const KinkStrip& strip : impl_->kinks)
     add_kink_tangent(strip, impl_->layouts[strip.panel].law, q.data(), dq.data(), df.data());
+}
+
+void ShellModel::apply_tangent(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
+                               Eigen::Ref<Eigen::VectorXd> df, TangentKind kind, Workers* workers) const {
+  df.setZero();
+  add_force_change(q, dq, df, kind, workers);
   df = -df;
 }
 
-ShellModel::CellShare ShellModel::stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                                const Eigen::Ref<const Eigen::VectorXd>& dq) const {
+CellShare ShellModel::stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                    const Eigen::Ref<const Eigen::VectorXd>& dq) const {
   CellShare best;
   double largest = -1;
   impl_->for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
@@ -706,6 +702,26 @@ ShellModel::CellShare ShellModel::stiffest_cell(const Eigen::Ref<const Eigen::Ve
   return best;
 }
 
+ScalarRow ShellModel::place(int panel, double u, double v) const {
+  const NurbsSurface& surface = panels()[panel].rest;
+  SurfaceBasis basis;
+  evaluate_basis(surface, u, v, basis);
+  ScalarRow row;
+  for (int b = 0; b < basis.count_v; ++b)
+    for (int a = 0; a < basis.count_u; ++a) {
+      const double value = basis.value[0][a + basis.count_u * b];
+      if (value == 0) continue;
+      row.index.push_back(first_point(panel) + surface.index(basis.first_u + a, basis.first_v + b));
+      row.value.push_back(value);
+    }
+  return row;
+}
+
+Eigen::Matrix3Xd ShellModel::net(int panel, const Eigen::Ref<const Eigen::VectorXd>& q) const {
+  const Eigen::Index count = panels()[panel].rest.points().cols();
+  return q.segment(3 * first_point(panel), 3 * count).reshaped(3, count);
+}
+
 MaterialPoint ShellModel::material_point(int panel, double u, double v) const {
   const MaterialBasis basis = impl_->basis_at(panel, u, v);
   const int base = impl_->first[panel] + impl_->panels[panel].rest.index(basis.first_u, basis.first_v);
@@ -715,14 +731,14 @@ MaterialPoint ShellModel::material_point(int panel, double u, double v) const {
   return point;
 }
 
-ShellState ShellModel::state(int panel, double u, double v, const Eigen::Ref<const Eigen::VectorXd>& q) const {
-  const ShellPanel& p = impl_->panels[panel];
+MaterialState ShellModel::state(int panel, double u, double v, const Eigen::Ref<const Eigen::VectorXd>& q) const {
+  const ClothPanel& p = impl_->panels[panel];
   const MaterialBasis basis = impl_->basis_at(panel, u, v);
   const double* panel_q = q.data() + 3 * static_cast<std::ptrdiff_t>(impl_->first[panel]);
   const PointJet<double> x = jet_at(basis, p.rest, panel_q);
   const Curvature<double> kappa = curvature(x), natural = natural_curvature(p, basis);
 
-  ShellState state;
+  MaterialState state;
   state.position.setZero();
   for (int k = 0; k < basis.size(); ++k) {
     const int index = p.rest.index(basis.first_u, basis.first_v) + impl_->layouts[panel].offset[k];

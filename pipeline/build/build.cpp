@@ -9,6 +9,7 @@
 
 #include "analysis/constraint/averaged_rows.h"
 #include "analysis/map/extension.h"
+#include "analysis/shell/shell_model.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
@@ -197,7 +198,7 @@ NurbsSurface start_surface(const PanelFile& file, const ScenePanel& panel, const
 
 struct PanelParts {
   BuiltPanel built;
-  ShellPanel shell;
+  ClothPanel shell;
   Eigen::Matrix3Xd start;
   AffineMap::Matrix dependence;
 };
@@ -268,11 +269,6 @@ int Build::panel(const std::string& name) const {
   throw InputError(fmt::format("no panel is called '{}'", name));
 }
 
-Eigen::Matrix3Xd Build::net(int panel, const Eigen::VectorXd& q) const {
-  const Eigen::Index count = rest(panel).points().cols();
-  return q.segment(3 * model->first_control_point(panel), 3 * count).reshaped(3, count);
-}
-
 Build build(Scene scene) {
   Build result;
   result.scene = std::move(scene);
@@ -301,7 +297,7 @@ Build build(Scene scene) {
   result.read_seconds = since(reading);
 
   const Clock::time_point trimming = Clock::now();
-  std::vector<ShellPanel> shells;
+  std::vector<ClothPanel> shells;
   std::vector<Eigen::Triplet<double>> dependence;
   std::vector<Eigen::Matrix3Xd> starts;
   int count = 0;
@@ -342,9 +338,9 @@ Build build(Scene scene) {
   result.start.resize(3 * count);
   result.mass_floor.resize(count);
   for (std::size_t k = 0; k < starts.size(); ++k) {
-    const int first = result.model->first_control_point(static_cast<int>(k));
+    const int first = result.model->first_point(static_cast<int>(k));
     result.start.segment(3 * first, starts[k].size()) = starts[k].reshaped();
-    const ShellPanel& panel = result.model->panels()[k];
+    const ClothPanel& panel = result.model->panels()[k];
     result.mass_floor.segment(first, starts[k].cols()) = mass_floor(panel.rest, panel.fabric.density);
   }
   // A start from a file satisfies the dependence to rounding only where that file came from the same panel.
@@ -369,7 +365,7 @@ Build build(Scene scene) {
     const NurbsSurface& rest = result.rest(k);
     const std::string who = fmt::format("{}: traction {} ({})", traction.where, t, traction.along.text);
     const PanelPlaces places{panel.name, panel.face, panel.topology, rest, start, panel.carries_cloth};
-    const int first = result.model->first_control_point(k);
+    const int first = result.model->first_point(k);
     SurfaceBasis basis;
     for (const LinePoint& point : line_points(traction.along, places, who)) {
       evaluate_basis(rest, point.uv.x(), point.uv.y(), basis);

@@ -10,8 +10,8 @@
 #include "analysis/constraint/constraint_rows.h"
 #include "analysis/map/affine_map.h"
 #include "analysis/map/smooth_seam.h"
+#include "analysis/model/model.h"
 #include "analysis/scheme/verlet.h"
-#include "analysis/shell/shell_model.h"
 #include "geometry/trimmed_surface.h"
 #include "io/iges.h"
 #include "pipeline/build/trace_panel.h"
@@ -32,12 +32,12 @@ struct BuiltPanel : PanelTrace {  // `extra_points` with those at pinned uv poin
 };
 
 // Everything of a run that doesn't change with pins being released.
-//   (1) start satisfies `dependence`; (2) model control points are those of the panels in order.
+//   (1) start satisfies `dependence`; (2) the model's points are the panels' control points, in order.
 struct Build {
   Scene scene;
   std::vector<PanelFile> files;
   std::vector<BuiltPanel> panels;
-  std::unique_ptr<ShellModel> model;
+  std::unique_ptr<Model> model;
   AffineMap::Matrix dependence;  // of all control points
   Eigen::VectorXd start;         // 3 n [m]
   Eigen::VectorXd mass_floor;    // n [kg]: 0.01 of density times cell area
@@ -50,7 +50,7 @@ struct Build {
   // The rest of a panel, SI, scene axes: what the model calls unstrained.
   const NurbsSurface& rest(int panel) const { return model->panels()[static_cast<std::size_t>(panel)].rest; }
   // A panel's net out of the control points of all panels [m].
-  Eigen::Matrix3Xd net(int panel, const Eigen::VectorXd& q) const;
+  Eigen::Matrix3Xd net(int panel, const Eigen::VectorXd& q) const { return model->net(panel, q); }
 };
 
 // Throws InputError (files, names), GeometryError (panel, loop, place; pin or traction on a trimmed-away place).

@@ -35,7 +35,7 @@ std::vector<Eigen::Vector2d> marks(const Address& at, const NurbsSurface& rest) 
 // stretch so far, from one to the other beside the straight line of the parameter plane. Infinite where that line
 // leaves the material.
 double reach(const Build& build, int panel, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-  const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+  const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
   const BuiltPanel& built = build.panels[static_cast<std::size_t>(panel)];
   const StrainLimit& limit = build.scene.strain_limit;
   constexpr int parts = 32;
@@ -64,7 +64,7 @@ void refuse_out_of_reach(const Build& build, double t, const MovedPoint& moved) 
       const ScenePin &p = scene.pins[a], &q = scene.pins[b];
       if (p.panel != q.panel || !(p.move || q.move)) continue;
       const int panel = build.panel(p.panel);
-      const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+      const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
       if (!shell.straight_u) continue;
       double end = std::max(p.move ? p.move->end : 0, q.move ? q.move->end : 0);
       for (const ScenePin* pin : {&p, &q}) end = std::min(end, pin->release.value_or(end));

@@ -22,23 +22,8 @@ namespace {
 
 // Rows of a curve pin depend on each other; below this part of a row's own size it adds nothing that others don't hold.
 constexpr double smallest_place_pivot = 1e-3;
-
-ScalarRow row_at(const Build& build, int panel, const Eigen::Vector2d& uv) {
-  const NurbsSurface& rest = build.rest(panel);
-  const int first = build.model->first_control_point(panel);
-  SurfaceBasis basis;
-  evaluate_basis(rest, uv.x(), uv.y(), basis);
-  ScalarRow row;
-  for (int b = 0; b < basis.count_v; ++b) {
-    for (int a = 0; a < basis.count_u; ++a) {
-      const double value = basis.value[0][static_cast<std::size_t>(a + basis.count_u * b)];
-      if (value == 0) continue;
-      row.index.push_back(first + rest.index(basis.first_u + a, basis.first_v + b));
-      row.value.push_back(value);
-    }
-  }
-  return row;
-}
+// Starting threads takes some microseconds: with fewer points a step by one is as fast.
+constexpr int least_points_for_threads = 2000;
 
 // What is held on one side of a seam is held on the other.
 std::vector<int> on_both_sides(const std::vector<int>& control_points, const std::vector<int>& leader) {
@@ -135,7 +120,7 @@ std::string held_twice(const Scene& scene, const std::vector<Candidate>& candida
 
 }  // namespace
 
-double extent(const ShellPanel& panel) {
+double extent(const ClothPanel& panel) {
   Eigen::Matrix3Xd places(3, panel.quadrature.points.size());
   for (Eigen::Index k = 0; k < places.cols(); ++k) {
     const Eigen::Vector2d& uv = panel.quadrature.points[static_cast<std::size_t>(k)];
@@ -153,7 +138,7 @@ double default_limit_stiffness(const Build& build, int panel) {
   const Scene& scene = build.scene;
   const StrainLimit& limit = scene.strain_limit;
   constexpr double reserve = 10;
-  const ShellPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+  const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
   double load = shell.fabric.density * scene.gravity.norm() * extent(shell);
   for (const SceneTraction& traction : scene.tractions) load = std::max(load, traction.force.norm());
   const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
@@ -161,7 +146,7 @@ double default_limit_stiffness(const Build& build, int panel) {
   return reserve * std::max({load / narrowest, own, shell.fabric.density});
 }
 
-std::unique_ptr<System> assemble(const Build& build, double t) {
+std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers) {
   const Scene& scene = build.scene;
   auto system = std::make_unique<System>();
 
@@ -194,16 +179,16 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
         if (leads) followers.push_back(i);
         continue;
       }
-      held.push_back({build.model->first_control_point(k) + i, static_cast<int>(p)});
+      held.push_back({build.model->first_point(k) + i, static_cast<int>(p)});
       if (leads) count(i);  // a seam's place counts once
     }
     // Fixed by itself a point of a smooth seam would no longer follow its neighbours, and the seam could fold there.
     for (const int i : followers) {
-      candidates.push_back({{{build.model->first_control_point(k) + i}, {1.0}}, static_cast<int>(p), true});
+      candidates.push_back({{{build.model->first_point(k) + i}, {1.0}}, static_cast<int>(p), true});
     }
     if (points == 0) std::ranges::for_each(followers, count);
     for (const Eigen::Vector2d& uv : place.points) {
-      candidates.push_back({row_at(build, k, uv), static_cast<int>(p), place.every_point});
+      candidates.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), place.every_point});
       mean[p] += apply(candidates.back().row, build.start);
       ++points;
     }
@@ -242,8 +227,10 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
                                               return moved(pins[i], places[i], time);
                                             });
 
-  DynamicSystem& dynamic = system->dynamic;
-  dynamic.model = build.model.get();
+  MechanicalSystem& dynamic = system->dynamic;
+  dynamic.body = build.model.get();
+  dynamic.potentials = build.model->potentials();
+  if (build.model->point_count() >= least_points_for_threads) dynamic.workers = workers;
   dynamic.map = system->map.get();
   dynamic.loads = build.loads;
   dynamic.node_mass = system->map->reduce_scalar(build.model->lumped_mass());
@@ -281,7 +268,7 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
     if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::second_order) {
       std::vector<double> stiffness, rate;
       for (std::size_t k = 0; k < build.panels.size(); ++k) {
-        const ShellPanel& panel = build.model->panels()[k];
+        const ClothPanel& panel = build.model->panels()[k];
         stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
         // Slow vibrations of the limit lose in a step what waves cross of the panel and back: with half of it example
         // 4.1(a) gains 6e-5 of the work of gravity at 4 ms, with all of it nothing.
@@ -312,7 +299,7 @@ std::unique_ptr<System> assemble(const Build& build, double t) {
       system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
     else
       system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
-    system->projection->use_threads(build.model->workers());
+    system->projection->use_threads(dynamic.workers);
   }
   dynamic.projection = system->projection.get();
   return system;

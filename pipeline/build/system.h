@@ -26,11 +26,11 @@ struct System {
   std::vector<int> place_pin;  // pin of each place row
   std::unique_ptr<AffineMap> map;
   std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
-  DynamicSystem dynamic;
+  MechanicalSystem dynamic;
 };
 
 // Edge of the square whose corners are as far from its middle as the farthest cloth is [m].
-double extent(const ShellPanel& panel);
+double extent(const ClothPanel& panel);
 
 // Stiffness of the strain limit of a panel [N/m]: the scene's, else one that strains by a tenth of the narrowest limit
 // under the panel's whole weight or the largest traction, and is at least ten times the fabric's own.
@@ -39,8 +39,8 @@ double default_limit_stiffness(const Build& build, int panel);
 
 // Pins released at or before t are left out. Throws InputError where two pins hold one control point and move apart,
 // or farther than the cloth between them reaches, GeometryError for places that don't exist, SolverError where place
-// rows contradict each other.
-std::unique_ptr<System> assemble(const Build& build, double t);
+// rows contradict each other. `workers`: threads of the steps, which must outlive the system; null: the caller's alone.
+std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers = nullptr);
 
 // State that continues control points q with velocities v (3 n each) under this system at time t.
 DynamicState state_from(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double t);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "analysis/shell/kink_strip.h"
+#include "analysis/model/kink_points.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
 

@@ -9,6 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "analysis/parallel/workers.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
 #include "io/file.h"
@@ -107,7 +108,9 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   refuse_not_simulated(scene);
   const std::filesystem::path directory = options.directory.value_or(std::filesystem::path("out") / scene.name);
   const Build built = build(std::move(scene));
-  built.model->use_threads(options.threads);
+  std::optional<Workers> threads;
+  if (options.threads > 1) threads.emplace(options.threads);
+  Workers* const workers = threads ? &*threads : nullptr;
   for (const std::string& warning : built.warnings) console.warning(warning);
   for (const std::string& note : built.notes) console.detail(note);
   for (const std::string& note : built.scene.notes) console.note(note);
@@ -116,10 +119,10 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   RunResult result;
   std::unique_ptr<System> start_system;
   if (options.resume) {
-    result = read_checkpoint(*options.resume, built);
+    result = read_checkpoint(*options.resume, built, workers);
     require_time_left(built, result);
   } else {
-    start_system = assemble(built, 0);
+    start_system = assemble(built, 0, workers);
   }
   const bool goes_on = options.resume && holds(directory, *options.resume);
   if (!goes_on) prepare_directory(directory, options.overwrite);
@@ -148,6 +151,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   };
   const InterruptGuard guard;
   RunHooks hooks;
+  hooks.workers = workers;
   hooks.stop = [&] {
     if (guard.asked()) return RunExit::interrupted;
     const auto& limit = built.scene.time_limit;
@@ -266,7 +270,7 @@ int dry_run(Scene scene, bool json, Console& console) {
     }
     out["seconds_per_step"] = per_step;
     out["estimated_bytes"] = bytes;
-    out["control_points"] = built.model->control_point_count();
+    out["control_points"] = built.model->point_count();
     out["degrees_of_freedom"] = 3 * system->map->nodes();
     out["strain_rows"] = system->strain_rows;
     out["pin_rows"] = 3 * system->place_rows;
@@ -287,7 +291,7 @@ int dry_run(Scene scene, bool json, Console& console) {
     fmt::print("time       about {:.2g} s, without frames\n", per_step * static_cast<double>(steps));
   }
   fmt::print("memory     about {:.2g} MB\n", bytes / 1e6);
-  fmt::print("unknowns   {} of {} control points\n", 3 * system->map->nodes(), built.model->control_point_count());
+  fmt::print("unknowns   {} of {} control points\n", 3 * system->map->nodes(), built.model->point_count());
   fmt::print("rows       {} of strain, {} of pins\n", system->strain_rows, 3 * system->place_rows);
   for (const auto& [why, count] : reasons) fmt::print("unused     {} constraint points: {}\n", count, why);
   return exit_ok;

@@ -77,7 +77,11 @@ void History::add(const RunResult& now) {
 
 std::string History::header() const {
   std::vector<std::string> cells{"frame", "step", "t", "dt"};
-  for (const auto& [what, joule] : energy_entries({})) cells.emplace_back(what);
+  EnergyBalance energy;  // for the names of its parts
+  Eigen::VectorXd force(build_.start.size());
+  energy.stored = internal_force(build_.model->potentials(), build_.start, force).energy;
+  energy.stored.set("limit", 0);
+  for (const auto& [what, joule] : energy_entries(energy)) cells.emplace_back(what);
   for (const char* name : {"strain_max_weft", "strain_min_weft", "strain_max_warp", "strain_min_warp", "iterations",
                            "iterations_total", "redone_steps", "contacts"})
     cells.emplace_back(name);

@@ -180,7 +180,7 @@ struct FrameWriter::Impl {
       for (const BuiltPanel& panel : build.panels) triangles.push_back(triangulate(panel.face, panel.topology));
     }
     shown.surfaces.reserve(build.panels.size());
-    const ShellModel& model = *build.model;
+    const Model& model = *build.model;
     for (std::size_t k = 0; k < build.panels.size(); ++k) {
       shown.points.push_back(system.points[k]);
       const auto& extra = system.extra_points[k];
@@ -205,7 +205,7 @@ struct FrameWriter::Impl {
       panel.face = &built.face;
       panel.triangles = &triangles[k];
       for (const Eigen::Vector2d& uv : triangles[k].uv) {
-        const ShellState at = model.state(index, uv.x(), uv.y(), q);
+        const MaterialState at = model.state(index, uv.x(), uv.y(), q);
         panel.fields.strain.push_back(at.strain);
         panel.fields.curvature.push_back(at.curvature);
         panel.fields.second_pk.push_back(at.second_pk);

@@ -64,17 +64,16 @@ Json measures_json(const System& system, const RunResult& run, const StateMeasur
 }  // namespace
 
 std::vector<std::pair<const char*, double>> energy_entries(const EnergyBalance& e) {
-  return {{"kinetic", e.kinetic},
-          {"membrane", e.membrane},
-          {"bending", e.bending},
-          {"limit", e.limit},
-          {"gravity", e.gravity},
-          {"dissipated", e.dissipated()},
-          {"dissipated_by_drag", 0 - e.drag_work},
-          {"dissipated_by_steps", e.numerical()},
-          {"loads_work", e.load_work},
-          {"motion_work", e.motion_work},
-          {"injected", e.injected}};
+  std::vector<std::pair<const char*, double>> entries{{"kinetic", e.kinetic}};
+  for (const EnergyParts::Part& part : e.stored) entries.emplace_back(part.name, part.value);
+  entries.insert(entries.end(), {{"gravity", e.gravity},
+                                 {"dissipated", e.dissipated()},
+                                 {"dissipated_by_drag", 0 - e.drag_work},
+                                 {"dissipated_by_steps", e.numerical()},
+                                 {"loads_work", e.load_work},
+                                 {"motion_work", e.motion_work},
+                                 {"injected", e.injected}});
+  return entries;
 }
 
 Json report_json(const Build& build, const RunResult& run, const StateMeasures& m, double write_seconds) {
@@ -117,7 +116,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
     used += static_cast<std::size_t>(std::ranges::count(panel, true, &ConstraintPoint::used));
   }
   report["degrees_of_freedom"] = 3 * system.map->nodes();
-  report["control_points"] = build.model->control_point_count();
+  report["control_points"] = build.model->point_count();
   report["constraint_points"] = points;
   report["constraint_points_used"] = scene.strain_limit.on ? used : 0;
   report["constraint_rows"] = {{"strain", system.strain_rows}, {"pins", 3 * system.place_rows}};

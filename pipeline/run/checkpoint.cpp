@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include "geometry/error.h"
 #include "io/file.h"
@@ -19,7 +20,7 @@ namespace toile {
 namespace {
 
 constexpr std::string_view first_word = "toile checkpoint ";
-constexpr int format_number = 4;  // raise it when the meaning of a byte changes
+constexpr int format_number = 5;  // raise it when the meaning of a byte changes
 
 // Every step can be undone, so that a change of any one word always shows in the end.
 std::uint64_t checksum(std::string_view bytes) {
@@ -56,15 +57,14 @@ void fields(auto& archive, Like<LoopState> auto& s) {
   archive(s.assembled, s.done, s.dt_scale, s.calm, s.patience, s.steps_since_bound, s.bound_every, s.strain,
           s.strain_at_bound, s.scale, s.balance, s.trough, s.rounding, s.kick);
 }
-void fields(auto& archive, Like<ShellModel::Cell> auto& c) {
+void fields(auto& archive, Like<Cell> auto& c) {
   archive(c.panel, c.i, c.j);
 }
 void fields(auto& archive, Like<TimeStepBound> auto& b) {
   archive(b.dt, b.eigenvalue, b.relative_gap, b.cell, b.bending);
 }
 void fields(auto& archive, Like<EnergyBalance> auto& e) {
-  archive(e.kinetic, e.membrane, e.bending, e.limit, e.start, e.load_work, e.drag_work, e.motion_work, e.gravity,
-          e.injected);
+  archive(e.kinetic, e.stored, e.start, e.load_work, e.drag_work, e.motion_work, e.gravity, e.injected);
 }
 void fields(auto& archive, Like<ProjectionReport> auto& r) {
   archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);
@@ -108,6 +108,10 @@ class Writer {
   void put(const std::map<std::string, std::string>& table) {
     put(table.size());
     for (const auto& [key, value] : table) put(key), put(value);
+  }
+  void put(const EnergyParts& energies) {
+    put(energies.size());
+    for (const EnergyParts::Part& part : energies) put(std::string(part.name)), put(part.value);
   }
   template <class T>
   requires std::is_class_v<T>
@@ -171,6 +175,19 @@ class Reader {
       get(table[key]);
     }
   }
+  void get(EnergyParts& energies) {
+    static std::set<std::string> names;  // parts know theirs by address
+    energies = {};
+    const std::size_t parts = count(sizeof(double));
+    if (parts > EnergyParts::capacity) fail("the checkpoint has more energies than there are");
+    for (std::size_t k = 0; k < parts; ++k) {
+      std::string name;
+      double value = 0;
+      get(name);
+      get(value);
+      energies.set(names.insert(name).first->c_str(), value);
+    }
+  }
   template <class T>
   requires std::is_class_v<T>
   void get(T& record) { fields(*this, record); }
@@ -231,7 +248,7 @@ std::string format_checkpoint(const SceneMark& scene, const RunState& state, con
   return std::move(file.bytes);
 }
 
-RunResult parse_checkpoint(std::string_view bytes, const std::string& name, const Build& build) {
+RunResult parse_checkpoint(std::string_view bytes, const std::string& name, const Build& build, Workers* workers) {
   const auto refuse = [&](const std::string& what) { throw InputError(name + ": " + what); };
   const std::size_t line = bytes.find('\n');
   if (!bytes.starts_with(first_word.substr(0, std::min(bytes.size(), first_word.size()))) || bytes.empty()) {
@@ -265,7 +282,7 @@ RunResult parse_checkpoint(std::string_view bytes, const std::string& name, cons
   RunResult result;
   RunState& state = result;
   reader(state);
-  result.system = assemble(build, state.loop.assembled);
+  result.system = assemble(build, state.loop.assembled, workers);
   const System& system = *result.system;
   ProjectionMemory memory;
   if (system.projection) reader(memory);
@@ -283,8 +300,8 @@ RunResult parse_checkpoint(std::string_view bytes, const std::string& name, cons
   return result;
 }
 
-RunResult read_checkpoint(const std::filesystem::path& path, const Build& build) {
-  return parse_checkpoint(read_file(path), path.string(), build);
+RunResult read_checkpoint(const std::filesystem::path& path, const Build& build, Workers* workers) {
+  return parse_checkpoint(read_file(path), path.string(), build, workers);
 }
 
 }  // namespace toile

@@ -26,7 +26,8 @@ SceneMark scene_mark(const Build& build);
 std::string format_checkpoint(const SceneMark& scene, const RunState& state, const System& system);
 
 // Throws InputError naming `name`, and the key that differs.
-RunResult parse_checkpoint(std::string_view bytes, const std::string& name, const Build& build);
-RunResult read_checkpoint(const std::filesystem::path& path, const Build& build);
+RunResult parse_checkpoint(std::string_view bytes, const std::string& name, const Build& build,
+                           Workers* workers = nullptr);
+RunResult read_checkpoint(const std::filesystem::path& path, const Build& build, Workers* workers = nullptr);
 
 }  // namespace toile

@@ -94,14 +94,14 @@ void measure_limit(const ConstraintRows& rows, const Eigen::VectorXd& q, StateMe
 // Energy of the fabric's weft and warp strain over the cloth less that of the strains that the rows see: what hourglass
 // modes hold. Negative where the rows count more than there is.
 double unseen_energy(const Build& build, const System& system, const Eigen::VectorXd& q) {
-  const ShellModel& model = *build.model;
+  const Model& model = *build.model;
   double energy = 0;
   for (std::size_t k = 0; k < model.panels().size(); ++k) {
-    const ShellPanel& panel = model.panels()[k];
+    const ClothPanel& panel = model.panels()[k];
     for (std::size_t p = 0; p < panel.quadrature.points.size(); ++p) {
       const Eigen::Vector2d& uv = panel.quadrature.points[p];
       const SurfaceJet jet = evaluate(panel.rest, uv.x(), uv.y());
-      const ShellState at = model.state(static_cast<int>(k), uv.x(), uv.y(), q);
+      const MaterialState at = model.state(static_cast<int>(k), uv.x(), uv.y(), q);
       energy += 0.5 * panel.quadrature.weights[p] * jet.area_scale() * at.second_pk.head<2>().dot(at.strain.head<2>());
     }
   }
@@ -172,7 +172,7 @@ std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& sys
 
 StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt) {
   StateMeasures m;
-  const ShellModel& model = *build.model;
+  const Model& model = *build.model;
   const Eigen::VectorXd q = control_points(system, state);
   const std::vector<GridSample> samples = grid_samples(build);
   std::vector<Eigen::Vector2d> strain, nominal, second_pk;
@@ -193,7 +193,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
     m.highest = std::max(m.highest, axis.dot(x));
   };
   for (const GridSample& s : samples) {
-    const ShellState at = model.state(s.panel, s.uv.x(), s.uv.y(), q);
+    const MaterialState at = model.state(s.panel, s.uv.x(), s.uv.y(), q);
     strain.emplace_back(at.strain.head<2>());
     shear.push_back(at.strain[2]);
     if (field) {
@@ -215,7 +215,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
 
   for (std::size_t k = 0; k < build.panels.size(); ++k) {
     for (const ConstraintPoint& point : build.panels[k].points) {
-      const ShellState at = model.state(static_cast<int>(k), point.u, point.v, q);
+      const MaterialState at = model.state(static_cast<int>(k), point.u, point.v, q);
       reach(at.position);
       if (system.strain_rows == 0) {
         m.at_constraints_max = std::max(m.at_constraints_max, at.strain.head<2>().cwiseAbs().maxCoeff());
@@ -223,7 +223,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
     }
   }
   if (system.projection) measure_limit(system.projection->rows(), q, m);
-  for (const ShellPanel& panel : model.panels()) {
+  for (const ClothPanel& panel : model.panels()) {
     for (std::size_t k = 0; k < panel.quadrature.points.size(); ++k) {
       const SurfaceJet jet = evaluate(panel.rest, panel.quadrature.points[k].x(), panel.quadrature.points[k].y());
       const double area = panel.quadrature.weights[k] * jet.area_scale();

@@ -32,16 +32,10 @@ constexpr int first_steps = 10;  // little is turned over yet, so that a part of
 
 // Kinetic energy that nobody sees: of cloth that would cross its own distance from the origin in 1e8 s, or that moves
 // by the rounding of its places in a step. Without loads there is nothing else to compare a rise with.
-double rounding_energy(const DynamicSystem& system, const Eigen::VectorXd& q, double dt) {
+double rounding_energy(const MechanicalSystem& system, const Eigen::VectorXd& q, double dt) {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const double speed = q.lpNorm<Eigen::Infinity>() * (1e-8 + (dt > 0 ? 64 * epsilon / dt : 0));
   return 0.5 * system.node_mass.sum() * speed * speed;
-}
-
-// The membrane's tangent grows like 1 + 3 E in tension; squeezed cloth bends more stiffly, per length 1 + 2 E.
-bool stiffer(const StrainRange& now, const StrainRange& before) {
-  return 1 + 3 * now.largest > (1 + stiffening) * (1 + 3 * before.largest) ||
-         1 + 2 * now.least < (1 - stiffening) * (1 + 2 * before.least);
 }
 
 class Loop {
@@ -91,7 +85,7 @@ class Loop {
 
  private:
   void begin() {
-    result_.system = start_system_ ? std::move(start_system_) : assemble(build_, 0);
+    result_.system = start_system_ ? std::move(start_system_) : assemble(build_, 0, hooks_.workers);
     result_.warnings = result_.system->warnings;
     warn_of_stiff_limit();
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(build_.start.size());
@@ -100,13 +94,12 @@ class Loop {
     result_.last_projection.converged = true;
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     Eigen::VectorXd force(q.size());
-    const ShellEnergy elastic = build_.model->internal_force(q, force);
-    result_.energy.membrane = elastic.membrane;
-    result_.energy.bending = elastic.bending;
-    result_.energy.limit = limit_energy();
+    const Elastic elastic = internal_force(build_.model->potentials(), q, force, hooks_.workers);
+    result_.energy.stored = elastic.energy;
+    result_.energy.stored.set("limit", limit_energy());
     result_.energy.start = result_.energy.elastic();
     result_.loop.scale = result_.energy.start;
-    result_.loop.strain = {elastic.least_strain, elastic.largest_strain};
+    result_.loop.strain = elastic.strain;
     evaluate_bound();
     if (scene_.dt) hold_to_bound();
     result_.loop.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
@@ -175,7 +168,7 @@ class Loop {
     loop.steps_since_bound = 0;
     loop.bound_every = bound_every;
     const bool held = bounded();
-    if (!held && !stiffer(loop.strain, loop.strain_at_bound)) return;
+    if (!held && !stiffer(loop.strain, loop.strain_at_bound, stiffening)) return;
     loop.strain_at_bound = loop.strain;
     if (!held) return hold_to_bound();
     result_.bound = ask_for_bound();
@@ -211,7 +204,8 @@ class Loop {
   }
 
   TimeStepBound bound_of(const System& system) const {
-    return time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, control_points(system, result_.state));
+    return time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, control_points(system, result_.state),
+                           system.dynamic.workers);
   }
   double limit_energy() const {
     const System& system = *result_.system;
@@ -349,9 +343,8 @@ class Loop {
   void accept(const StepReport& report) {
     EnergyBalance& e = result_.energy;
     e.kinetic = report.kinetic;
-    e.membrane = report.elastic.membrane;
-    e.bending = report.elastic.bending;
-    e.limit = report.limit_energy;
+    e.stored = report.elastic.energy;
+    e.stored.set("limit", report.limit_energy);
     e.load_work += report.load_work;
     e.drag_work += report.drag_work;
     e.motion_work += report.motion_work;
@@ -373,8 +366,8 @@ class Loop {
     }
     ++result_.steps;
     ++result_.loop.steps_since_bound;
-    result_.loop.strain = {report.elastic.least_strain, report.elastic.largest_strain};
-    if (stiffer(result_.loop.strain, result_.loop.strain_at_bound))
+    result_.loop.strain = report.elastic.strain;
+    if (stiffer(result_.loop.strain, result_.loop.strain_at_bound, stiffening))
       result_.loop.steps_since_bound = result_.loop.bound_every;
   }
 
@@ -384,18 +377,18 @@ class Loop {
     if (!any) return;
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
-    result_.system = assemble(build_, t);
+    result_.system = assemble(build_, t, hooks_.workers);
     result_.loop.assembled = t;
     result_.state = state_from(*result_.system, q, v, t);
     // The released control points' kinetic energy joins the balance.
     double kinetic = 0;
-    const DynamicSystem& dynamic = result_.system->dynamic;
+    const MechanicalSystem& dynamic = result_.system->dynamic;
     for (Eigen::Index k = 0; k < dynamic.node_mass.size(); ++k) {
       kinetic += 0.5 * dynamic.node_mass[k] * result_.state.v.segment<3>(3 * k).squaredNorm();
     }
-    result_.energy.start += kinetic - result_.energy.kinetic + limit_energy() - result_.energy.limit;
+    result_.energy.start += kinetic - result_.energy.kinetic + limit_energy() - result_.energy.stored.of("limit");
     result_.energy.kinetic = kinetic;
-    result_.energy.limit = limit_energy();
+    result_.energy.stored.set("limit", limit_energy());
     result_.last_projection.converged = true;
     evaluate_bound();
   }
@@ -496,7 +489,7 @@ double rest_tolerance(const Build& build) {
   if (!build.scene.rest) return 0;
   if (build.scene.rest->tolerance) return *build.scene.rest->tolerance;
   double largest = 0;
-  for (const ShellPanel& panel : build.model->panels()) largest = std::max(largest, extent(panel));
+  for (const ClothPanel& panel : build.model->panels()) largest = std::max(largest, extent(panel));
   return rest_share * largest;
 }
 
@@ -516,7 +509,7 @@ double planned_step(const Scene& scene, const TimeStepBound& bound) {
   return scene.dt ? *scene.dt : std::min(step_safety * bound.dt, scene.every);
 }
 
-std::string describe_cell(const Build& build, const ShellModel::Cell& cell) {
+std::string describe_cell(const Build& build, const Cell& cell) {
   const BuiltPanel& panel = build.panels[static_cast<std::size_t>(cell.panel)];
   const KnotMesh& mesh = panel.topology.mesh;
   const auto i = static_cast<std::size_t>(cell.i), j = static_cast<std::size_t>(cell.j);
@@ -534,7 +527,7 @@ void require_time_left(const Build& build, const RunState& state) {
 double gravity_potential(const Build& build, const Eigen::VectorXd& q) {
   const Eigen::VectorXd moved = q - build.start;
   double potential = 0;
-  for (int i = 0; i < build.model->control_point_count(); ++i) {
+  for (int i = 0; i < build.model->point_count(); ++i) {
     potential -= build.model->lumped_mass()[i] * build.scene.gravity.dot(moved.segment<3>(3 * i));
   }
   return potential;

@@ -35,20 +35,16 @@ struct RunProgress {
 
 struct EnergyBalance {
   double kinetic = 0;                                    // J, in the middle of the last step
-  double membrane = 0, bending = 0, limit = 0;           // J, now; limit: of the strain limits
+  EnergyParts stored;                                    // J, now: the potentials', and "limit" of the strain limits
   double start = 0;                                      // J, kinetic and elastic at the start
   double load_work = 0, drag_work = 0, motion_work = 0;  // J, since the start
   double gravity = 0;                                    // J, potential against the start; at the end of a run
   double injected = 0;  // J, largest rise of the balance above the start, 0 where it never rose
-  double elastic() const { return membrane + bending + limit; }
+  double elastic() const { return stored.total(); }
   double now() const { return kinetic + elastic(); }
   // What drag took, and with it the step: damping by the strain limit, or less than nothing where energy rose.
   double dissipated() const { return start + load_work + motion_work - now(); }
   double numerical() const { return dissipated() + drag_work; }
-};
-
-struct StrainRange {
-  double least = 0, largest = 0;  // of ShellEnergy
 };
 
 // What the step loop carries from step to step besides the state of the cloth.
@@ -97,6 +93,7 @@ struct RunResult : RunState {
 };
 
 struct RunHooks {
+  Workers* workers = nullptr;                        // threads of the run; null: the caller's alone
   std::function<void(const RunFrame&)> frame;        // at 0, at every multiple of `every`, at `until`; in order
   std::function<void(const RunProgress&)> progress;  // after each step
   // After the first frame, each step and each later frame: a run may be taken up from here.
@@ -127,7 +124,7 @@ double rest_tolerance(const Build& build);
 // its own, or as check_failed after max_steps.
 // The step is deterministic: no decision depends on time of day, addresses or thread count.
 RunResult run(const Build& build, const RunHooks& hooks = {});
-// The same with what assemble(build, 0) gave.
+// The same with what assemble(build, 0, hooks.workers) gave.
 RunResult run(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks = {});
 
 // Goes on from a run of the same build (read_checkpoint): the end is that of a run that never stopped, to the bit,
@@ -140,6 +137,6 @@ std::vector<double> frame_times(const Scene& scene);
 double planned_step(const Scene& scene, const TimeStepBound& bound);
 
 // "panel 'front', cell (3, 4), u in [0.3, 0.4], v in [0.4, 0.5]".
-std::string describe_cell(const Build& build, const ShellModel::Cell& cell);
+std::string describe_cell(const Build& build, const Cell& cell);
 
 }  // namespace toile

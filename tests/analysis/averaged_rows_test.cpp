@@ -20,10 +20,10 @@ struct Cloth {
 };
 Cloth cloth(TrimmedSurface face, double grain = 0) {
   TrimTopology topology = trace_trims(face);
-  ShellPanel panel = test::make_panel(face.surface);
+  ClothPanel panel = test::make_panel(face.surface);
   panel.quadrature = quadrature(face, topology);
   panel.grain = grain;
-  std::vector<ShellPanel> panels{panel};
+  std::vector<ClothPanel> panels{panel};
   return {face, topology, ShellModel(std::move(panels))};
 }
 TrimmedSurface square(int degree, int spans) {

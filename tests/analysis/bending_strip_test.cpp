@@ -7,8 +7,9 @@
 #include <numbers>
 
 #include "analysis/map/affine_map.h"
+#include "analysis/model/kink_points.h"
 #include "analysis/scheme/time_step.h"
-#include "analysis/shell/kink_strip.h"
+#include "analysis/shell/kink_kernel.h"
 #include "analysis/shell/shell_model.h"
 #include "geometry/refine.h"
 #include "support/near.h"
@@ -19,8 +20,8 @@ namespace {
 
 using test::Random;
 
-ShellPanel kinked_panel(const NurbsSurface& rest, const Fabric& fabric, double grain = 0) {
-  ShellPanel panel = test::make_panel(rest, fabric, grain);
+ClothPanel kinked_panel(const NurbsSurface& rest, const Fabric& fabric, double grain = 0) {
+  ClothPanel panel = test::make_panel(rest, fabric, grain);
   const TrimmedSurface face = untrimmed(rest);
   panel.kinks = kink_points(face, trace_trims(face));
   return panel;
@@ -163,14 +164,14 @@ Hung hung(int degree, int spans, const std::vector<double>& c0, bool strips_on) 
       test::flat_surface(1, 0.1, uniform_knots(degree, spans), uniform_knots(degree, 1)), Direction::u, c0);
   const ShellModel model({strips_on ? kinked_panel(flat, fabric) : test::make_panel(flat, fabric)});
   std::vector<int> free, held;
-  for (int k = 0; k < model.control_point_count(); ++k) {
+  for (int k = 0; k < model.point_count(); ++k) {
     if (k % flat.count_u() <= 1) held.push_back(k);
     for (int c = 0; c < 3 && k % flat.count_u() > 1; ++c) free.push_back(3 * k + c);
   }
   const int n = static_cast<int>(free.size());
   Eigen::VectorXd q = model.rest(), force(q.size()), dq(q.size()), column(q.size());
   Eigen::VectorXd weight = Eigen::VectorXd::Zero(q.size());
-  for (int k = 0; k < model.control_point_count(); ++k) weight[3 * k + 2] = -model.lumped_mass()[k];
+  for (int k = 0; k < model.point_count(); ++k) weight[3 * k + 2] = -model.lumped_mass()[k];
   Eigen::MatrixXd K(n, n);
   for (int iteration = 0; iteration < 30; ++iteration) {
     for (int j = 0; j < n; ++j) {
@@ -184,7 +185,7 @@ Hung hung(int degree, int spans, const std::vector<double>& c0, bool strips_on) 
     if (r.norm() < 1e-8 * weight(free).norm()) break;
     q(free) += K.partialPivLu().solve(r);
   }
-  const AffineMap map(AffineMap::identity(model.control_point_count()), {}, {});
+  const AffineMap map(AffineMap::identity(model.point_count()), {}, {});
   return {-model.state(0, 1, 0.5, q).position[2],
           time_step_bound(model, map, map.reduce_scalar(model.lumped_mass()), model.rest()).dt};
 }

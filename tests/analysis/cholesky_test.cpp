@@ -98,7 +98,8 @@ TEST_P(CholeskyOfSize, ThreadsAndTheirNumberDontShow) {
   const Eigen::VectorXd rhs = Eigen::VectorXd::LinSpaced(GetParam(), 1, 2);
   const auto solution = [&](int threads) {
     Cholesky factor(s.pattern);
-    if (threads > 1) factor.use_threads(std::make_shared<Workers>(threads));
+    Workers workers(threads);
+    if (threads > 1) factor.use_threads(&workers);
     EXPECT_TRUE(factor.factorise(s.values));
     Eigen::VectorXd x(rhs.size());
     factor.solve(rhs, x);
@@ -146,7 +147,8 @@ TEST(Cholesky, SolvesAGridByOneThreadAndThree) {
   ASSERT_TRUE(factor.factorise(values));
   factor.solve(rhs, one);
   EXPECT_LT((one - expected).cwiseAbs().maxCoeff(), 1e-11);
-  factor.use_threads(std::make_shared<Workers>(3));
+  Workers workers(3);
+  factor.use_threads(&workers);
   ASSERT_TRUE(factor.factorise(values));
   factor.solve(rhs, three);
   EXPECT_EQ(one, three);

@@ -64,7 +64,7 @@ TEST(Extension, CoefficientsContinueEveryPolynomialOfTheDegree) {
 // A panel of `spans` x `spans` cells whose material ends `cut` of a cell behind the third knot line, to the right and
 // above.
 struct CutPanel {
-  ShellPanel panel;
+  ClothPanel panel;
   Extension extension;
 };
 CutPanel cut_panel(NurbsSurface surface, double cut, const Fabric& fabric = {}, const ExtensionOptions& options = {}) {
@@ -75,7 +75,7 @@ CutPanel cut_panel(NurbsSurface surface, double cut, const Fabric& fabric = {}, 
   };
   CutPanel out{test::make_panel(surface, fabric), {}};
   out.panel.quadrature = test::tensor_quadrature(surface, {end(surface.u()), end(surface.v())});
-  std::vector<ShellPanel> panels{out.panel};
+  std::vector<ClothPanel> panels{out.panel};
   const ShellModel model(std::move(panels));
   out.extension = extend(surface, out.panel.quadrature, model.lumped_mass(), options);
   out.panel.rest = out.extension.rest;
@@ -159,7 +159,7 @@ TEST_P(ExtendedPanel, DeviationIsTheLargestMoveWithinTheMaterial) {
     const std::vector<double> b = k.breaks();
     return Interval{b[2] - cut * (b[2] - b[1]), b.back()};
   };
-  ShellPanel panel = test::make_panel(before);
+  ClothPanel panel = test::make_panel(before);
   panel.quadrature = test::tensor_quadrature(before, {begin(before.u()), begin(before.v())});
   const Extension extension =
       extend(before, panel.quadrature, ShellModel({panel}).lumped_mass(), {.largest_deviation = 10});

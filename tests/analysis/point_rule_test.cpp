@@ -32,20 +32,21 @@ Swing swing(const TrimmedSurface& face, PointRule rule) {
   std::vector<std::vector<ConstraintPoint>> points{constraint_points(face, topology)};
   const std::vector<ConstraintPoint> extra = apply_rule(rule, face, topology, points[0]);
   points[0].insert(points[0].end(), extra.begin(), extra.end());
-  ShellPanel panel = test::make_panel(face.surface);
+  ClothPanel panel = test::make_panel(face.surface);
   panel.kinks = kink_points(face, topology);
   const ShellModel model({panel});
   const Eigen::VectorXd rest = model.rest();
   const std::vector<int> corners{0, face.surface.count_u() - 1};
-  const AffineMap map(AffineMap::identity(model.control_point_count()), corners,
+  const AffineMap map(AffineMap::identity(model.point_count()), corners,
                       [&](std::size_t k, double) { return Eigen::Vector3d(rest.segment<3>(3 * corners[k])); });
-  DynamicSystem system;
-  system.model = &model;
+  MechanicalSystem system;
+  system.body = &model;
+  system.potentials = model.potentials();
   system.map = &map;
   system.node_mass = map.reduce_scalar(model.lumped_mass());
   system.node_drag = map.reduce_scalar(model.lumped_drag());
   system.loads.force.resize(rest.size());
-  for (int i = 0; i < model.control_point_count(); ++i)
+  for (int i = 0; i < model.point_count(); ++i)
     system.loads.force.segment<3>(3 * i) << 0, 0, -9.81 * model.lumped_mass()[i];
   std::vector<StrainRow> rows = select_rows(model, map, points, {});
   for (StrainRow& row : rows) row.stiffness = 1170 * row.area;  // k / rho = 1e4 m2/s2

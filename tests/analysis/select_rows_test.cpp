@@ -29,7 +29,7 @@ Fabric stiff_fabric() {
 
 // A strip (width x height, centred on the origin, weft along x) as a trim in a square patch turned by `angle`.
 struct Strip {
-  ShellPanel panel;
+  ClothPanel panel;
   std::vector<std::vector<ConstraintPoint>> points;
   Extension extension;
 };
@@ -39,7 +39,7 @@ Strip finish(TrimmedSurface surface, double grain) {
   Strip strip;
   strip.panel = {"strip", surface.surface, quadrature(surface, topology), stiff_fabric(), grain};
   strip.points = {constraint_points(surface, topology)};
-  std::vector<ShellPanel> panels{strip.panel};
+  std::vector<ClothPanel> panels{strip.panel};
   strip.extension = extend(strip.panel.rest, strip.panel.quadrature, ShellModel(std::move(panels)).lumped_mass());
   strip.panel.rest = strip.extension.rest;
   return strip;
@@ -101,7 +101,7 @@ struct Rolled {
 // Bending energy of the strip on a cylinder of the given radius about y, after its rows are met to a tenth of the usual
 // limit.
 Rolled roll(Strip strip, double radius) {
-  std::vector<ShellPanel> panels{strip.panel};
+  std::vector<ClothPanel> panels{strip.panel};
   const ShellModel model(std::move(panels));
   const AffineMap map(strip.extension.dependence, {}, nullptr);
   const Eigen::VectorXd mass = map.reduce_scalar(model.lumped_mass());
@@ -140,7 +140,7 @@ TEST(SelectRows, TrimmedStripRolledIntoACylinderBendsLikeTheFittedOne) {
 
 TEST(SelectRows, TakesEveryPointThatCanMove) {
   Strip strip = trimmed_strip(1, 0.25, 0.05, 0.3);
-  std::vector<ShellPanel> panels{strip.panel};
+  std::vector<ClothPanel> panels{strip.panel};
   const ShellModel model(std::move(panels));
   const AffineMap map(strip.extension.dependence, {}, nullptr);
   const auto rows = select_rows(model, map, strip.points, {});
@@ -155,7 +155,7 @@ TEST(SelectRows, TakesEveryPointThatCanMove) {
 
 TEST(SelectRows, RowsShareTheAreaOfTheCloth) {
   for (Strip strip : {fitted_strip(1, 0.25, 0.05), trimmed_strip(1, 0.25, 0.05, 0.3)}) {
-    std::vector<ShellPanel> panels{strip.panel};
+    std::vector<ClothPanel> panels{strip.panel};
     const ShellModel model(std::move(panels));
     const AffineMap map(strip.extension.dependence, {}, nullptr);
     double weft = 0, warp = 0;
@@ -167,12 +167,12 @@ TEST(SelectRows, RowsShareTheAreaOfTheCloth) {
 
 TEST(SelectRows, PointsOnFixedControlPointsOnlyAreLeftOut) {
   Strip strip = fitted_strip(1, 0.25, 0.05);
-  std::vector<ShellPanel> panels{strip.panel};
+  std::vector<ClothPanel> panels{strip.panel};
   const ShellModel model(std::move(panels));
   std::vector<int> edge;
   const int n = strip.panel.rest.count_u();
   for (int k = 0; k < 2 * n; ++k) edge.push_back(k);  // two rows: a clamp
-  const AffineMap map(AffineMap::identity(model.control_point_count()), edge,
+  const AffineMap map(AffineMap::identity(model.point_count()), edge,
                       [&](std::size_t k, double) { return Eigen::Vector3d(model.rest().segment<3>(3 * edge[k])); });
   const auto rows = select_rows(model, map, strip.points, {});
   for (const ConstraintPoint& point : strip.points[0]) {
@@ -190,9 +190,9 @@ TEST(SelectRows, NearPointsAreMergedAndVerticesWin) {
   near.kind = PointKind::crossing_u;
   near.v += 0.04 / 5;  // in a domain of five cells
   points.insert(points.begin(), near);
-  std::vector<ShellPanel> panels{strip.panel};
+  std::vector<ClothPanel> panels{strip.panel};
   const ShellModel model(std::move(panels));
-  const AffineMap map(AffineMap::identity(model.control_point_count()), {}, nullptr);
+  const AffineMap map(AffineMap::identity(model.point_count()), {}, nullptr);
   select_rows(model, map, strip.points, {});
   EXPECT_FALSE(points[0].used);
   EXPECT_EQ(points[0].why, "merged");
@@ -201,12 +201,12 @@ TEST(SelectRows, NearPointsAreMergedAndVerticesWin) {
 
 TEST(SelectRows, PinsThatContradictEachOtherAreNamed) {
   Strip strip = fitted_strip(1, 0.25, 0.05);
-  std::vector<ShellPanel> panels{strip.panel};
+  std::vector<ClothPanel> panels{strip.panel};
   const ShellModel model(std::move(panels));
-  const AffineMap map(AffineMap::identity(model.control_point_count()), {}, nullptr);
+  const AffineMap map(AffineMap::identity(model.point_count()), {}, nullptr);
   const auto pin = [&](int number, double u, double v, double z) {
     const Eigen::Vector3d place(0, 0, z);
-    return PlaceRow{place_row(model, 0, u, v), number, [place](double) { return place; }};
+    return PlaceRow{model.place(0, u, v), number, [place](double) { return place; }};
   };
   // Pins that agree, or hold different places, cost no strain row.
   const std::size_t rows = select_rows(model, map, strip.points, {}).size();

@@ -56,7 +56,7 @@ Tip shell_tip(int degree, int spans, double gamma, double membrane) {
   const ShellModel model({test::make_flat_panel(length, width, degree, spans, 1, fabric)});
   const NurbsSurface& surface = model.panels()[0].rest;
   std::vector<int> free;  // all but the first two rows of control points: place and slope
-  for (int k = 0; k < model.control_point_count(); ++k)
+  for (int k = 0; k < model.point_count(); ++k)
     if (k % surface.count_u() > 1)
       for (int c = 0; c < 3; ++c) free.push_back(3 * k + c);
   const int n = static_cast<int>(free.size());
@@ -65,7 +65,7 @@ Tip shell_tip(int degree, int spans, double gamma, double membrane) {
   const int increments = 10;
   for (int increment = 1; increment <= increments; ++increment) {
     Eigen::VectorXd weight = Eigen::VectorXd::Zero(q.size());
-    for (int k = 0; k < model.control_point_count(); ++k)
+    for (int k = 0; k < model.point_count(); ++k)
       weight[3 * k + 2] = -gamma * increment / increments * model.lumped_mass()[k];
     double residual = 1;
     for (int iteration = 0; iteration < 60 && residual > 1e-6; ++iteration) {

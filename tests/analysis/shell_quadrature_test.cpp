@@ -31,7 +31,7 @@ CutQuadrature rule_on(const NurbsSurface& surface, const QuadratureOptions& opti
 }
 
 Eigen::MatrixXd stiffness(const NurbsSurface& surface, const CutQuadrature& rule) {
-  ShellPanel panel = test::make_panel(surface);
+  ClothPanel panel = test::make_panel(surface);
   panel.quadrature = rule;
   const ShellModel model({panel});
   const Eigen::Index n = model.rest().size();
@@ -117,7 +117,7 @@ TEST(ShellQuadrature, KeepsTheOrder) {
       Fabric fabric;
       fabric.bending = {.b0 = 0.01, .kappa0 = 3, .kappa_reg = 0.5};
       const auto energy = [&](const CutQuadrature& rule) {
-        ShellPanel panel = test::make_panel(sheet, fabric);
+        ClothPanel panel = test::make_panel(sheet, fabric);
         panel.quadrature = rule;
         const ShellModel model({panel});
         Eigen::VectorXd q = model.rest(), force(q.size());

@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "analysis/parallel/workers.h"
 #include "analysis/shell/shell_model.h"
 #include "support/near.h"
 #include "support/panels.h"
@@ -114,7 +115,7 @@ TEST_P(ShellLaws, InternalForcesHaveNoResultantAndNoTorque) {
   Eigen::VectorXd force(q.size());
   m.internal_force(q, force);
   Eigen::Vector3d resultant = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
-  for (int k = 0; k < m.control_point_count(); ++k) {
+  for (int k = 0; k < m.point_count(); ++k) {
     const Eigen::Vector3d f = force.segment<3>(3 * k), x = q.segment<3>(3 * k);
     resultant += f;
     torque += x.cross(f);
@@ -136,7 +137,7 @@ TEST_P(ShellLaws, StateAgreesWithMaterialPoint) {
   const ShellModel m = model();
   const Eigen::VectorXd q = deformed(m);
   const MaterialPoint p = m.material_point(0, 0.37, 0.21);
-  const ShellState state = m.state(0, 0.37, 0.21, q);
+  const MaterialState state = m.state(0, 0.37, 0.21, q);
   std::array<Eigen::Vector3d, 6> x;
   for (int r = 0; r < 6; ++r) {
     x[r].setZero();
@@ -147,7 +148,7 @@ TEST_P(ShellLaws, StateAgreesWithMaterialPoint) {
   expect_near_rel(state.strain[2], x[1].dot(x[2]), 1e-12);
   expect_near_rel(state.nominal[1], x[2].norm() * 25.0 * state.strain[1], 1e-12);
   // The tangents at rest are orthonormal: weft and warp.
-  const ShellState rest = m.state(0, 0.37, 0.21, m.rest());
+  const MaterialState rest = m.state(0, 0.37, 0.21, m.rest());
   EXPECT_LT(rest.strain.norm(), 1e-13);
   EXPECT_LT(rest.curvature.norm(), 1e-12);
 }
@@ -174,13 +175,13 @@ TEST(ShellModel, HomogeneousDeformationGivesOneStressAndNoInteriorForce) {
       Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
       F.col(0) << 1.1, 0.05, 0.2;
       F.col(1) << -0.1, 0.9, 0.1;
-      const int n = model.control_point_count();
+      const int n = model.point_count();
       const Eigen::VectorXd q = (F * model.rest().reshaped(3, n)).reshaped();
       const Eigen::Vector3d weft = F * Eigen::Vector3d(std::cos(grain), std::sin(grain), 0);
       const Eigen::Vector3d warp = F * Eigen::Vector3d(-std::sin(grain), std::cos(grain), 0);
       for (const double u : {0.0, 0.31, 1.0})
         for (const double v : {0.0, 0.77, 1.0}) {
-          const ShellState state = model.state(0, u, v, q);
+          const MaterialState state = model.state(0, u, v, q);
           expect_near_rel(state.second_pk[0], 11.7 * 0.5 * (weft.squaredNorm() - 1), 1e-11);
           expect_near_rel(state.second_pk[1], 25.0 * 0.5 * (warp.squaredNorm() - 1), 1e-11);
           expect_near_rel(state.second_pk[2], 4.68 * weft.dot(warp), 1e-11);
@@ -207,7 +208,7 @@ TEST(ShellModel, RationalCylinderHasTheCurvatureOfItsRadius) {
     const ShellModel model({test::make_panel(cylinder, fabric, grain)});
     const double c = std::cos(grain), s = std::sin(grain);
     for (const double u : {0.0, 0.13, 0.5, 0.99}) {
-      const ShellState state = model.state(0, u, 0.4, model.rest());
+      const MaterialState state = model.state(0, u, 0.4, model.rest());
       expect_near_rel(state.curvature[0], c * c / radius, 1e-11);
       expect_near_rel(state.curvature[1], s * s / radius, 1e-11, 1e-11);
       expect_near_rel(state.curvature[2], -c * s / radius, 1e-11, 1e-11);
@@ -332,10 +333,10 @@ TEST(ShellModel, ClothResistsMoreTheFurtherItIsSqueezed) {
 }
 
 TEST(ShellModel, PanelsDontTouchEachOther) {
-  const ShellPanel a = test::make_flat_panel(1, 1, 2, 3, 3), b = test::make_panel(test::bumpy_surface(3, 2, 3, true));
+  const ClothPanel a = test::make_flat_panel(1, 1, 2, 3, 3), b = test::make_panel(test::bumpy_surface(3, 2, 3, true));
   const ShellModel both({a, b}), first({a}), second({b});
-  EXPECT_EQ(both.control_point_count(), first.control_point_count() + second.control_point_count());
-  EXPECT_EQ(both.first_control_point(1), first.control_point_count());
+  EXPECT_EQ(both.point_count(), first.point_count() + second.point_count());
+  EXPECT_EQ(both.first_point(1), first.point_count());
   const Eigen::VectorXd q = both.rest() + 0.02 * Random(9).vector(both.rest().size());
   Eigen::VectorXd f(q.size()), fa(first.rest().size()), fb(second.rest().size());
   both.internal_force(q, f);
@@ -356,7 +357,7 @@ TEST(ShellModel, BothKindsOfTablesGiveTheSameForceAndTangent) {
                                                 clamped_knots(degree_v, std::vector{0.0, 0.3, 0.4, 1.0}));
       surface = surface.with_points(
           surface.points() + 0.02 * Random(3).vector(surface.points().size()).reshaped(3, surface.points().cols()));
-      ShellPanel tensor = test::make_panel(surface, fabric, 0.3), full = tensor;
+      ClothPanel tensor = test::make_panel(surface, fabric, 0.3), full = tensor;
       for (CellRule& cell : full.quadrature.cells) cell.tensor = false;
       const ShellModel a({tensor}), b({full});
       EXPECT_LT(a.table_bytes(), b.table_bytes());
@@ -373,10 +374,10 @@ TEST(ShellModel, BothKindsOfTablesGiveTheSameForceAndTangent) {
 // Cutting the same cloth into cells with other numbers of points changes which cells share a lane group, nothing else.
 TEST(ShellModel, CellsOfUnequalRulesAddUp) {
   const NurbsSurface surface = test::flat_surface(1, 1, uniform_knots(2, 5), uniform_knots(2, 5));
-  ShellPanel whole = test::make_panel(surface, stiff_fabric()), left = whole, right = whole;
+  ClothPanel whole = test::make_panel(surface, stiff_fabric()), left = whole, right = whole;
   left.quadrature = test::tensor_quadrature(surface, {Interval{0, 0.47}, Interval{0, 1}});
   right.quadrature = test::tensor_quadrature(surface, {Interval{0.47, 1}, Interval{0, 1}}, 5);
-  ShellPanel joined = left;
+  ClothPanel joined = left;
   for (CellRule cell : right.quadrature.cells) {
     cell.first += static_cast<int>(left.quadrature.points.size());
     joined.quadrature.cells.push_back(cell);
@@ -398,8 +399,8 @@ TEST(Shell, ThreadsGiveTheSameBits) {
   for (const int degree : {2, 3}) {
     for (const bool rational : {false, true}) {
       // Two panels, so that threads meet in the middle of one, and material that cuts cells.
-      ShellPanel whole = test::make_panel(test::bumpy_surface(degree, 40, 30, rational), stiff_fabric(0.01));
-      ShellPanel cut = test::make_panel(test::bumpy_surface(degree, 20, 17, false), stiff_fabric());
+      ClothPanel whole = test::make_panel(test::bumpy_surface(degree, 40, 30, rational), stiff_fabric(0.01));
+      ClothPanel cut = test::make_panel(test::bumpy_surface(degree, 20, 17, false), stiff_fabric());
       cut.quadrature = test::tensor_quadrature(cut.rest, {Interval{-0.7, 1.63}, Interval{0.03, 0.41}});
       ShellModel model({whole, cut});
       const Eigen::Index n = model.rest().size();
@@ -408,13 +409,13 @@ TEST(Shell, ThreadsGiveTheSameBits) {
       const ShellEnergy energy = model.internal_force(q, force);
       model.apply_tangent(q, dq, image);
       for (const int threads : {2, 3, 7, 1}) {
-        model.use_threads(threads);
+        Workers workers(threads);
         for (int repeat = 0; repeat < 3; ++repeat) {
-          const ShellEnergy again = model.internal_force(q, same);
+          const ShellEnergy again = model.internal_force(q, same, &workers);
           EXPECT_EQ(same, force) << threads << " threads, degree " << degree;
           EXPECT_EQ(again.membrane, energy.membrane);
           EXPECT_EQ(again.bending, energy.bending);
-          model.apply_tangent(q, dq, same);
+          model.apply_tangent(q, dq, same, TangentKind::upper, &workers);
           EXPECT_EQ(same, image) << threads << " threads, degree " << degree;
         }
       }

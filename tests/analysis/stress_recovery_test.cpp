@@ -24,24 +24,24 @@ struct Limited {
 };
 Limited limited(const TrimmedSurface& face, PointRule rule = PointRule::greville_derivative) {
   const TrimTopology topology = trace_trims(face);
-  std::vector<ShellPanel> panels{test::make_panel(face.surface)};
+  std::vector<ClothPanel> panels{test::make_panel(face.surface)};
   panels[0].quadrature = quadrature(face, topology);
   ShellModel model(std::move(panels));
   std::vector<std::vector<ConstraintPoint>> points{constraint_points(face, topology)};
   const std::vector<ConstraintPoint> extra = apply_rule(rule, face, topology, points[0]);
   points[0].insert(points[0].end(), extra.begin(), extra.end());
-  const AffineMap map(AffineMap::identity(model.control_point_count()), {}, nullptr);
+  const AffineMap map(AffineMap::identity(model.point_count()), {}, nullptr);
   std::vector<StrainRow> rows = select_rows(model, map, points, {});
   return {std::move(model), {std::move(rows), {}}};
 }
 
 // Largest part of a uniform stress's force on a control point, over the largest force, that the rows' areas leave over.
 double unbalanced(const Limited& l, bool warp) {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(l.model.control_point_count()), whole = sum;
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(l.model.point_count()), whole = sum;
   for (const StrainRow& row : l.rows.strain)
     for (std::size_t k = 0; row.warp == warp && k < row.row.index.size(); ++k)
       sum[row.row.index[k]] += row.area * row.row.value[k];
-  const ShellPanel& panel = l.model.panels()[0];
+  const ClothPanel& panel = l.model.panels()[0];
   for (std::size_t p = 0; p < panel.quadrature.points.size(); ++p) {
     const Eigen::Vector2d& uv = panel.quadrature.points[p];
     const MaterialPoint point = l.model.material_point(0, uv.x(), uv.y());

@@ -23,10 +23,10 @@ struct Scene {
 
 // Control points without cloth are fixed; masses have the floor of 0.01 of a cell's, unless another is
 // given.
-Scene make_scene(ShellPanel panel, const std::function<Eigen::VectorXd(const ShellModel&)>& state,
+Scene make_scene(ClothPanel panel, const std::function<Eigen::VectorXd(const ShellModel&)>& state,
                  const std::vector<int>& pinned = {}, double mass_floor = 0.01) {
   ShellModel model({std::move(panel)});
-  const int n = model.control_point_count();
+  const int n = model.point_count();
   std::vector<int> fixed;
   for (int k = 0; k < n; ++k)
     if (model.lumped_mass()[k] == 0 || std::find(pinned.begin(), pinned.end(), k) != pinned.end()) fixed.push_back(k);
@@ -98,7 +98,7 @@ TEST(TimeStep, IsNearTheMeasuredLimitOfAnUncutPanel) {
 TEST(TimeStep, IsNearTheMeasuredLimitWithSliverCells) {
   for (const double sliver : {0.3, 1e-2, 1e-4})
     for (const double b0 : {3.3e-3, 1e-7}) {
-      ShellPanel panel = test::make_flat_panel(1, 1, 2, 8, 8, fabric(11.7, b0));
+      ClothPanel panel = test::make_flat_panel(1, 1, 2, 8, 8, fabric(11.7, b0));
       panel.quadrature = test::tensor_quadrature(panel.rest, {Interval{0, 0.5 + sliver / 8}, Interval{0.25, 1}});
       expect_step_near_limit(make_scene(std::move(panel), at_rest));
     }
@@ -120,7 +120,7 @@ TEST(TimeStep, IsNearTheMeasuredLimitOfACurvedState) {
   f.rest_curvature = RestCurvature::zero;
   const auto curved = [](const ShellModel& model) {
     Eigen::VectorXd q = model.rest();
-    for (int k = 0; k < model.control_point_count(); ++k) {
+    for (int k = 0; k < model.point_count(); ++k) {
       const double x = q[3 * k], y = q[3 * k + 1];
       q[3 * k + 2] += 0.03 * std::cos(12 * x) + 0.02 * y * y;  // curvatures from 0 to 4 per metre and some stretch
     }
@@ -182,7 +182,7 @@ TEST(TimeStep, MatchesThePublishedConstants) {
 }
 
 TEST(TimeStep, NamesTheSliverThatLimitsIt) {
-  ShellPanel panel = test::make_flat_panel(1, 1, 2, 8, 8, fabric(0, 3.3e-3));
+  ClothPanel panel = test::make_flat_panel(1, 1, 2, 8, 8, fabric(0, 3.3e-3));
   panel.quadrature = test::tensor_quadrature(panel.rest, {Interval{0, 0.5 + 0.02 / 8}, Interval{0, 1}});
   const Scene s = make_scene(std::move(panel), at_rest, {}, 1e-9);
   const TimeStepBound bound = time_step_bound(s.model, s.map, s.node_mass, s.q);

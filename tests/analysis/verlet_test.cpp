@@ -22,7 +22,7 @@ struct Scene {
   ShellModel model;
   AffineMap map;
   std::unique_ptr<ConstraintSolver> projection;
-  DynamicSystem system;
+  MechanicalSystem system;
   DynamicState state;
 
   struct Options {
@@ -41,22 +41,23 @@ struct Scene {
 
   explicit Scene(const Options& o)
       : model([&] {
-          std::vector<ShellPanel> panels;
+          std::vector<ClothPanel> panels;
           panels.push_back(test::make_flat_panel(o.size, o.size, o.degree, o.spans, o.spans, o.fabric));
           return panels;
         }()),
         map(
-            AffineMap::identity(model.control_point_count()), o.fixed,
+            AffineMap::identity(model.point_count()), o.fixed,
             o.motion ? o.motion : [rest = model.rest(), fixed = o.fixed](std::size_t k, double) {
               return Eigen::Vector3d(rest.segment<3>(3 * fixed[k]));
             }) {
-    system.model = &model;
+    system.body = &model;
+    system.potentials = model.potentials();
     system.map = &map;
     system.node_mass = map.reduce_scalar(model.lumped_mass());
     system.node_drag = map.reduce_scalar(model.lumped_drag());
-    system.loads.force = Eigen::VectorXd::Zero(3 * model.control_point_count());
+    system.loads.force = Eigen::VectorXd::Zero(3 * model.point_count());
     if (o.gravity)
-      for (int i = 0; i < model.control_point_count(); ++i)
+      for (int i = 0; i < model.point_count(); ++i)
         system.loads.force.segment<3>(3 * i) = model.lumped_mass()[i] * gravity;
 
     ConstraintRows rows;
@@ -74,7 +75,7 @@ struct Scene {
     }
     for (const Eigen::Vector2d& uv : o.pins) {
       const Eigen::Vector3d place = rest(uv[0], uv[1]);
-      rows.place.push_back({place_row(model, 0, uv[0], uv[1]), 0, [place](double) { return place; }});
+      rows.place.push_back({model.place(0, uv[0], uv[1]), 0, [place](double) { return place; }});
     }
     if (!rows.strain.empty() || !rows.place.empty())
       projection = o.lagrange ? std::unique_ptr<ConstraintSolver>(
@@ -200,7 +201,7 @@ TEST(Verlet, MovedPinsDoTheWorkThatTheClothTakesUp) {
   // The upper edge is lifted; all energy that arrives comes through the pins.
   std::vector<int> edge{0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
   const ShellModel reference = [] {
-    std::vector<ShellPanel> panels;
+    std::vector<ClothPanel> panels;
     panels.push_back(test::make_flat_panel(1, 1, 2, 8, 8));
     return ShellModel(std::move(panels));
   }();

@@ -58,8 +58,8 @@ BENCHMARK(shell_force_with_twist)->ArgName("p")->Arg(2)->Arg(3)->Unit(benchmark:
 
 void shell_force_by_threads(benchmark::State& state) {
   ShellBench bench(2, static_cast<int>(state.range(1)));
-  bench.model.use_threads(static_cast<int>(state.range(0)));
-  for (auto _ : state) benchmark::DoNotOptimize(bench.model.internal_force(bench.q, bench.force));
+  Workers workers(static_cast<int>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(bench.model.internal_force(bench.q, bench.force, &workers));
   bench.count(state);
 }
 BENCHMARK(shell_force_by_threads)

@@ -59,16 +59,22 @@ std::vector<DrapeCost> kidnapped_by_step(const std::filesystem::path& samples,
   return costs;
 }
 
+std::size_t quadrature_points(const Build& build) {
+  std::size_t count = 0;
+  for (const ClothPanel& panel : build.model->panels()) count += panel.quadrature.points.size();
+  return count;
+}
+
 StepCost step_cost(const std::filesystem::path& samples, int per_direction, int threads) {
   constexpr double least_seconds = 0.5;
   constexpr int least_steps = 5;
   const Build scene = kidnapped(samples, per_direction);
-  scene.model->use_threads(threads);
-  const auto system = assemble(scene, 0);
+  Workers workers(threads);
+  const auto system = assemble(scene, 0, &workers);
   const double dt = small_step(per_direction);
   StepCost cost;
   cost.control_points = per_direction * per_direction;
-  cost.quadrature_points = scene.model->quadrature_points();
+  cost.quadrature_points = quadrature_points(scene);
 
   const Eigen::VectorXd still = Eigen::VectorXd::Zero(scene.start.size());
   DynamicState state = state_from(*system, scene.start, still, 0);
@@ -91,7 +97,7 @@ StepCost step_cost(const std::filesystem::path& samples, int per_direction, int 
   cost.fill =
       static_cast<double>(system->projection->factor_nonzeros()) / (system->strain_rows + 3 * system->place_rows);
 
-  DynamicSystem free = system->dynamic;
+  MechanicalSystem free = system->dynamic;
   free.projection = nullptr;
   state = start;
   for (spent = 0; static_cast<int>(motion.size()) < least_steps || spent < least_seconds; spent += motion.back()) {
@@ -106,8 +112,8 @@ StepCost step_cost(const std::filesystem::path& samples, int per_direction, int 
 RunCost run_cost(const std::filesystem::path& samples, int per_direction, int threads) {
   constexpr int control_point_steps = 1000000;
   const Build scene = kidnapped(samples, per_direction);
-  scene.model->use_threads(threads);
-  const auto system = assemble(scene, 0);
+  Workers workers(threads);
+  const auto system = assemble(scene, 0, &workers);
   DynamicState state = state_from(*system, scene.start, Eigen::VectorXd::Zero(scene.start.size()), 0);
   StepWork work;
   const Clock::time_point begin = Clock::now();

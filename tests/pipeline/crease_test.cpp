@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "analysis/shell/shell_model.h"
 #include "geometry/error.h"
 #include "geometry/refine.h"
 #include "pipeline/panels.h"
@@ -58,7 +59,7 @@ TEST(Creases, AStripCarriesThemAndKeepsTheirAngle) {
   for (const KinkPoint& point : b.model->panels()[0].kinks) EXPECT_EQ(point.at, 160);
   EXPECT_FALSE(b.panels[0].extra_points.empty());
   EXPECT_LT(std::abs(crease_cosine(b)), 0.05);
-  std::vector<ShellPanel> without = b.model->panels();
+  std::vector<ClothPanel> without = b.model->panels();
   without[0].kinks.clear();
   b.model = std::make_unique<ShellModel>(without);
   EXPECT_GT(std::abs(crease_cosine(b)), 0.1);

@@ -84,7 +84,7 @@ TEST(Places, ALineLoadAddsUpToItsLength) {
                         test::scene_text("[[traction]]\nalong = \"curve:0,0,0.25,1\"\nforce = [0, -2, 0]\n",
                                          "[load]\ngravity = [0, 0, 0]\n"));
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (int i = 0; i < b.model->control_point_count(); ++i) sum += b.loads.force.segment<3>(3 * i);
+  for (int i = 0; i < b.model->point_count(); ++i) sum += b.loads.force.segment<3>(3 * i);
   expect_near_rel(sum.y(), -2 * 0.75 * 0.34, 1e-12);
   EXPECT_EQ(sum.x(), 0);
 }
@@ -141,7 +141,7 @@ TEST(Places, FractionsOfACurveCutInTwoAreOfWhatIsLeftInTheFilesDirection) {
           test::scene_text(std::string("[[traction]]\nalong = \"curve:0,0") + c.range + "\"\nforce = [0, -2, 0]\n",
                            "[load]\ngravity = [0, 0, 0]\n"));
       double force = 0, moment = 0;
-      for (int i = 0; i < b.model->control_point_count(); ++i) {
+      for (int i = 0; i < b.model->point_count(); ++i) {
         force += b.loads.force[3 * i + 1];
         moment += b.start[3 * i] * b.loads.force[3 * i + 1];
       }

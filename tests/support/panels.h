@@ -94,13 +94,13 @@ inline NurbsSurface flat_surface(double width, double height, KnotVector u, Knot
   return {std::move(u), std::move(v), points};
 }
 
-inline ShellPanel make_panel(NurbsSurface rest, const Fabric& fabric = {}, double grain = 0) {
-  ShellPanel panel{"panel", std::move(rest), {}, fabric, grain};
+inline ClothPanel make_panel(NurbsSurface rest, const Fabric& fabric = {}, double grain = 0) {
+  ClothPanel panel{"panel", std::move(rest), {}, fabric, grain};
   panel.quadrature = tensor_quadrature(panel.rest);
   return panel;
 }
 
-inline ShellPanel make_flat_panel(double width, double height, int degree, int spans_u, int spans_v,
+inline ClothPanel make_flat_panel(double width, double height, int degree, int spans_u, int spans_v,
                                   const Fabric& fabric = {}, double grain = 0) {
   return make_panel(flat_surface(width, height, uniform_knots(degree, spans_u), uniform_knots(degree, spans_v)), fabric,
                     grain);

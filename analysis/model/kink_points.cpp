@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "analysis/model/kink_points.h"
+
 #include <algorithm>
 
-#include "analysis/shell/kink_strip.h"
 #include "trimming/gauss.h"
 
 namespace toile {
