@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The kinds of failure that a caller can tell apart. The program maps each to an exit code (README, "Exit codes").
+// The kinds of failure that a caller can tell apart. The program maps each to an exit code (pipeline/base/README.md,
+// "Exit codes").
 #pragma once
 
 #include <stdexcept>

@@ -85,16 +85,14 @@ NurbsCurve<Dim> with_domain(const NurbsCurve<Dim>& curve, Interval domain);
 
 // Refinement to analysis resolution, clamped.
 //   (1) Degree per direction: the larger of the surface's and the asked one (at least 2 when one is asked). A flat
-//   affine
-//       panel takes exactly what is asked, and the larger of its own and 2 when nothing is.
+//       affine panel takes exactly what is asked, and the larger of its own and 2 when nothing is.
 //   (2) `span` [unit of the net] splits each span of the surface into ceil(length / span) equal parts, length being its
 //       longest iso-curve (a multiple to 1e-9 isn't split once more); `spans` and `control_points` ask for totals per
 //       direction, shared by length. At most one of the three may be set.
 //   (3) The surface's own distinct knots stay, bitwise; only where a flat affine panel is asked for fewer spans than it
 //       has does it get equal ones.
 //   (4) Where the continuity is below C1, knots are removed as far as the surface stays within `tolerance` (or
-//   rounding,
-//       256 epsilon of the net's size); those that stay C0 are listed.
+//       rounding, 256 epsilon of the net's size); those that stay C0 are listed.
 //   (5) A flat affine panel that has the resulting knots already comes back unchanged.
 struct RefineOptions {
   std::optional<int> degree = {};

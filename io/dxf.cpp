@@ -41,7 +41,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-// The layer that an item speaks for; empty where it repeats what the piece has on that layer.
+// The layer whose content an item is; empty where it repeats what the piece has on that layer.
 std::string meant_layer(const Piece& piece, const Item& item) {
   for (const auto& [repeat, original] : repeats) {
     if (item.layer != repeat) continue;
@@ -387,7 +387,7 @@ void DxfReader::read_piece(const Piece& piece) {
   add_panels(piece, std::move(found));
 }
 
-// A drawing without layers of pieces: outlines are told by what lies in what, marks by how they lie.
+// A drawing without layers of pieces: containment decides which curves are outlines, position which are marks.
 void DxfReader::read_plain(const Piece& piece) {
   Corners rule = corners(piece);
   rule.turn_points.clear();

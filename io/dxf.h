@@ -16,12 +16,10 @@ namespace toile {
 // 14 sew line; 84 to 87 repeat 1, 8, 11 and 14 as curves and are read only where those aren't there. Texts "Piece Name:
 // ", "Size: ", "Quantity: ", "Paired: "; of the file "Sample Size: " and "Units: ".
 //   (1) closed boundaries are panels, cutouts and inner boundaries their holes; numbers stay the file's, in the unit
-//   that
-//       it says (text, $INSUNITS, $MEASUREMENT) or the options do;
+//       that it says (text, $INSUNITS, $MEASUREMENT) or the options do;
 //   (2) of a piece in several sizes one is read: the asked one, else the sample size; "all" reads them all;
 //   (3) a boundary of several polylines is cut into curves at their ends, a closed polyline at its turn points, or
-//   where
-//       there are none at corners of more than 20 degrees; where sizes then differ in their number of curves, at
+//       where there are none at corners of more than 20 degrees; where sizes then differ in their number of curves, at
 //       sharper corners only, so that curve K is the same edge in each size. Bulges, arcs, ellipses and splines are
 //       exact;
 //   (4) a piece with an edge on its mirror line is unfolded, at each of its mirror lines; a paired piece is two panels,

@@ -4,6 +4,8 @@
 #include <set>
 #include <utility>
 
+#include "trimming/loops.h"
+
 namespace toile {
 
 std::vector<ConstraintPoint> constraint_points(const TrimmedSurface& surface, const TrimTopology& topology) {
@@ -33,6 +35,11 @@ std::vector<ConstraintPoint> constraint_points(const TrimmedSurface& surface, co
     points.push_back(point);
   }
   return points;
+}
+
+std::vector<ConstraintPoint> constraint_points(TrimmedSurface surface) {
+  validate_loops(surface);
+  return constraint_points(surface, trace_trims(surface));
 }
 
 }  // namespace toile

@@ -21,5 +21,7 @@ struct ConstraintPoint {
 
 // All of them, inner vertices first (u fastest), then events in the order of the loops; none twice.
 std::vector<ConstraintPoint> constraint_points(const TrimmedSurface& surface, const TrimTopology& topology);
+// The same in one call: loops validated as validate_loops() does, traced, listed. Throws what that throws.
+std::vector<ConstraintPoint> constraint_points(TrimmedSurface surface);
 
 }  // namespace toile

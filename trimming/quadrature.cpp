@@ -9,6 +9,7 @@
 
 #include "trimming/cell_boundary.h"
 #include "trimming/gauss.h"
+#include "trimming/loops.h"
 
 // A cut cell is integrated in three steps, all in the box of its material, [-1, 1]^2, and in products of Legendre
 // polynomials there:
@@ -569,6 +570,11 @@ CutQuadrature quadrature(const TrimmedSurface& surface, const TrimTopology& topo
       result.cells.push_back(cell);
     }
   return result;
+}
+
+CutQuadrature quadrature(TrimmedSurface surface, const QuadratureOptions& options) {
+  validate_loops(surface);
+  return quadrature(surface, trace_trims(surface), options);
 }
 
 }  // namespace toile

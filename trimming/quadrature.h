@@ -40,6 +40,8 @@ struct QuadratureOptions {
   bool one_less = false;
 };
 CutQuadrature quadrature(const TrimmedSurface& surface, const TrimTopology& topology, const QuadratureOptions& = {});
+// The same in one call: loops validated as validate_loops() does, traced, integrated. Throws what that throws.
+CutQuadrature quadrature(TrimmedSurface surface, const QuadratureOptions& options = {});
 
 // Area [unit of the net squared] of the trimmed surface and length [unit of the net] of its loops in space.
 struct PanelMeasure {

@@ -21,7 +21,7 @@ struct StrainRow {
   int panel = 0;
   int point = 0;  // in the panel's constraint points; -1: the row is a mean, of no point
   bool warp = false;
-  double area = 0;               // m2, of the cloth that the row speaks for
+  double area = 0;               // m2, of the cloth that the row represents
   double stiffness = 0;          // N m, force per strain times area; 0: hard
   double damping_rate = 0;       // 1/s, with a stiffness: see FastProjection::step
   Eigen::Vector2d uv{0, 0};      // where it stands on the panel

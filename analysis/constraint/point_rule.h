@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where strain is sampled for the limit. [Peng & Zheng 2022, 3.3, 3.4; analysis/README.md, "Sampling rules", has the
-// numbers that chose the default]
+// Where strain is sampled for the limit. [Peng & Zheng 2022, 3.3, 3.4; samples/studies/rules/README.md
+// has the numbers that chose the default]
 //
 // At degree p a direction of m spans has m + p control points but m + 1 knot lines: at p = 2 the knot-mesh vertices
 // number one less per direction than the control points, from p = 3 on they leave the border a freedom that nothing

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The cloth that strain rows speak for: the weights with which their points integrate a stress.
+// The area of cloth that each strain row represents: the weights with which their points integrate a stress.
 #pragma once
 
 #include <vector>
@@ -17,12 +17,12 @@ namespace toile {
 // a uniform stress of the limit is in equilibrium with what the cloth's border carries. On a uniform net at p = 2 that
 // is the trapezoidal rule along the threads and Simpson's across.
 //   (1) they still add up to the panels' area, but for nodes that reach no point; (2) independent of which nodes pins
-//   hold, but for control points that would follow others (extended, at smooth seams) if no pin held them; (3) no area
-//   is below a thousandth of the panel's mean: such a row would count as hard.
+//       hold, but for control points that would follow others (extended, at smooth seams) if no pin held them; (3) no
+//       area is below a thousandth of the panel's mean: such a row would count as hard.
 struct RowAreaOptions {
   double least = 0.2, most = 3;  // a row that others can stand for needn't vanish, nor one take over its neighbours
-  double damping = 1e-3;         // of a panel's longest equation: weights that are hardly told stay shares
-  int iterations = 200;          // at most: what is not told by then stays near the shares
+  double damping = 1e-3;  // of a panel's longest equation: poorly determined weights stay near their initial share
+  int iterations = 200;   // at most: what is undetermined by then stays near the shares
 };
 void weigh_rows(const Body& body, const AffineMap& map, const std::vector<ScalarRow>& values,
                 std::vector<StrainRow>& rows, const RowAreaOptions& options = {});

@@ -14,7 +14,7 @@ void merge_near_points(const NurbsSurface& surface, std::vector<ConstraintPoint>
 // only fixed control points) or "merged", and returns the strain rows of the others in the order of the points, then
 // those of `means` (averaged_rows()) that can move. Place rows are kept all; a SolverError names two that contradict
 // each other. Rows that depend on each other are taken all the same: with a stiffness they share their load
-// (analysis/README.md, "Which rows").
+// (analysis/constraint/README.md, "Which rows").
 std::vector<StrainRow> select_rows(const Body& body, const AffineMap& map,
                                    std::vector<std::vector<ConstraintPoint>>& points,
                                    const std::vector<PlaceRow>& place, const std::vector<StrainRow>& means = {});

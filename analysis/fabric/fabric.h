@@ -30,8 +30,8 @@ struct Fabric {
 // Energy per area, moment per length and slope of eq. (9), regularised: the square-root branch uses
 // (kappa^2 + kappa_reg^2)^(1/4), the linear branch continues it with the same energy and moment at kappa0.
 //   (1) moment = d energy / d kappa, odd in kappa; (2) slope = d moment / d kappa, positive, largest at 0 as long as
-//   kappa_reg < 4 kappa0, where it is 2 b0 sqrt(kappa0 / kappa_reg); (3) energy and moment are continuous, the slope
-//   jumps to b0 at kappa0 (which itself counts to the linear branch).
+//       kappa_reg < 4 kappa0, where it is 2 b0 sqrt(kappa0 / kappa_reg); (3) energy and moment are continuous, the
+//       slope jumps to b0 at kappa0 (which itself counts to the linear branch).
 struct BendingResponse {
   double energy = 0;  // N/m
   double moment = 0;  // N

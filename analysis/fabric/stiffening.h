@@ -2,11 +2,16 @@
 // How strain changes the stiffness of cloth under laws (8) and (9).
 #pragma once
 
+#include "geometry/fields.h"
+
 namespace toile {
 
 struct StrainRange {
   double least = 0, largest = 0;  // of E11, E22 and 0
 };
+void fields(auto& archive, Like<StrainRange> auto& r) {
+  archive(r.least, r.largest);
+}
 
 // Is the cloth stiffer by more than `share` than it was? The membrane's tangent grows like 1 + 3 E in tension; squeezed
 // cloth bends more stiffly, per length like 1 / (1 + 2 E).

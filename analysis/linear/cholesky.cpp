@@ -15,8 +15,8 @@
 namespace toile {
 namespace {
 
-// An envelope whose rows are longer than this in mean square is slower than supernodes (README, "Factor"): a square of
-// some 1,800 rows, a strip or several panels of any size.
+// An envelope whose rows are longer than this in mean square is slower than supernodes (tests/bench/README.md, "Sparse
+// factor"): a square of some 1,800 rows, a strip or several panels of any size.
 constexpr double longest_rows = 6000;
 
 // Neighbours of each row, without itself.

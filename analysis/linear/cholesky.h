@@ -29,7 +29,7 @@ class Cholesky {
   bool factorise(std::span<const double> values);
   // Not const: it works in memory of the factor's own, so one call at a time.
   void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x);
-  // What supernodes do is dealt out to these, with the same bits.
+  // Supernodes are shared out among these, with the same bits.
   void use_threads(Workers* workers);
   std::size_t factor_nonzeros() const;
   double factor_operations() const;  // floating-point, of one factorisation

@@ -14,7 +14,7 @@ namespace {
 constexpr int group_count = 4;
 constexpr int together = 4;      // columns of a supernode in a solve, so that its rows are read a quarter as often
 constexpr int block = 32;        // columns of an update that one thread works out
-constexpr int wide = 2 * block;  // updates from here on are dealt out
+constexpr int wide = 2 * block;  // updates from here on are shared out
 
 using Dense = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 

@@ -34,8 +34,8 @@ struct Extension {
 // no mechanics sees, follow the tangent plane of that cell instead: the untrimmed surface stays as near as the cloth's
 // own stretch, however far it reaches.
 //   (1) row sums are 1; (2) extended rows reproduce every polynomial of the surface's degree per direction, rows
-//   without cloth every affine map; (3) reduced lumped masses are positive where `lumped_mass` is: functions whose
-//   extension would leave less than `smallest_mass` are kept.
+//       without cloth every affine map; (3) reduced lumped masses are positive where `lumped_mass` is: functions whose
+//       extension would leave less than `smallest_mass` are kept.
 // `lumped_mass`: n row sums of the panel. `leader` (seam_leaders; empty: no control point is another): control points
 // of a seam are one, whose function is the sum of theirs; rows of followers are those of their leaders, so that the
 // seam stays closed bitwise. An extended one follows the cell of one side, so law (2) holds for polynomials continued

@@ -8,6 +8,7 @@
 
 #include "analysis/model/body.h"
 #include "analysis/model/potential.h"
+#include "geometry/fields.h"
 
 namespace toile {
 
@@ -15,6 +16,9 @@ namespace toile {
 struct Cell {
   int panel = 0, i = 0, j = 0;
 };
+void fields(auto& archive, Like<Cell> auto& c) {
+  archive(c.panel, c.i, c.j);
+}
 // A cell's part of dq . K(q) dq.
 struct CellShare {
   Cell cell;

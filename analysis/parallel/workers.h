@@ -23,8 +23,8 @@ class Workers {
 
   // body(part) once for each part of [0, parts), on any thread, in any order; returns when all are done.
   //   (1) The caller takes every part that no other thread has begun, so a thread that gets no processor delays
-  //   nothing. (2) Where bodies throw, the other parts are still done; then the exception of the lowest part is thrown
-  //   here, and
+  //       nothing.
+  //   (2) Where bodies throw, the other parts are still done; then the exception of the lowest part is thrown here, and
   //       the pool stays usable.
   //   (3) A call from within a body, or during another thread's call, does all its parts on its own thread.
   // Results have the same bits for any number of threads if what a part computes depends on the part alone.

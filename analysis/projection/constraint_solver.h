@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "analysis/constraint/constraint_rows.h"
+#include "geometry/fields.h"
 
 namespace toile {
 
@@ -27,18 +28,27 @@ struct ProjectionReport {
   double factor_seconds = 0;  // wall time of the numeric factorisations
   double solve_seconds = 0;   // and of the solutions by them
 };
+void fields(auto& archive, Like<ProjectionReport> auto& r) {
+  archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);
+}
 
 // Constraint forces of the steps before: what the next step needs to be of second order. Empty where there were none.
 struct ConstraintForces {
   Eigen::Matrix3Xd strain;  // N m, per strain row: at the start of the step, one and two steps before
   Eigen::Matrix3Xd place;   // N, per place row at the start: a first guess only
 };
+void fields(auto& archive, Like<ConstraintForces> auto& f) {
+  archive(f.strain, f.place);
+}
 
 // What the last step left behind, for reactions: rows and shapes as below.
 struct ProjectionMemory {
   Eigen::VectorXd strain_multipliers;
   Eigen::Matrix3Xd place_multipliers, strain_impulses;
 };
+void fields(auto& archive, Like<ProjectionMemory> auto& m) {
+  archive(m.strain_multipliers, m.place_multipliers, m.strain_impulses);
+}
 
 //   (1) fixed control points don't move;
 //   (2) linear momentum is kept where nothing is pinned;

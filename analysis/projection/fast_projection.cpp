@@ -21,8 +21,8 @@ constexpr double least_gain = 0.99;  // a violation above this times the best so
 constexpr double poor_gain = 0.25;   // an iteration that leaves more than this of the residual asks for a new factor
 constexpr double no_gain = 0.5;      // more than this left: the directions at hand no longer lead there
 constexpr double damped_residual = 0.1;  // what damps anyway needn't be exact
-// What a step leaves undone the next one makes up for in its own time, with a velocity of rest / dt: the rest that is
-// allowed falls with dt, but not below rounding.
+// The next step corrects the remaining violation, adding a velocity of violation / dt: what is allowed falls with dt,
+// but not below rounding.
 constexpr double least_exactness = 1e-6;
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
 

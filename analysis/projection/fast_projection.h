@@ -27,7 +27,7 @@ struct ProjectionOptions {
   double tolerance = 0.01;          // largest violation of a strain row that counts as met, see ProjectionReport
   double place_tolerance = 1e-9;    // m, of place rows
   // Strain rows are solved until C - law(lambda) falls below this part of the band, in a step below min(1, damping_rate
-  // dt) times that. A rest is energy from nowhere.
+  // dt) times that. Residual left here shows up as spurious energy.
   double residual = 0.005;
   // Added to the unit diagonal of the scaled strain rows. Dependent rows (an edge between two pins) need it where rows
   // are hard; where they have a stiffness it only steadies the iteration. 1e-3: example 4.1(a) by the paper's variant

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "analysis/scheme/verlet.h"
+#include "geometry/fields.h"
 
 namespace toile {
 
@@ -16,8 +17,7 @@ namespace toile {
 //   (1) `remaining` is the largest distance of any control point from where it was let go, at any time of the swing; no
 //       material point goes farther, as functions are nonnegative and sum to 1;
 //   (2) what was A away from its rest swings by 2 A, and by A within a quarter of its period: `remaining` is no less
-//   than
-//       the distance that is left of every swing whose quarter lasts no longer than the trial;
+//       than the distance that is left of every swing whose quarter lasts no longer than the trial;
 //   (3) a trial that goes beyond the tolerance ends at once, and the next peak halts the slow swing that it set free.
 struct Relaxation {
   int steps = 0, halts = 0, trials = 0;
@@ -32,6 +32,10 @@ struct Relaxation {
   int halts_before = 0;       // at its start
   Eigen::VectorXd from;       // control points at its start; empty: none began
 };
+void fields(auto& archive, Like<Relaxation> auto& r) {
+  archive(r.steps, r.halts, r.trials, r.remaining, r.dt_share, r.trial, r.length, r.count, r.moved, r.kinetic,
+          r.halts_before, r.from);
+}
 
 // Judges the step that led to `state` and halts the cloth where the kinetic energy fell: the next step starts from rest
 // (v_half = 0, constraints at work). `work` and `report` are of that step. Returns whether it halted.

@@ -4,6 +4,7 @@
 
 #include "analysis/map/affine_map.h"
 #include "analysis/model/model.h"
+#include "geometry/fields.h"
 
 namespace toile {
 
@@ -14,6 +15,9 @@ struct TimeStepBound {
   Cell cell;                // the cell that limits it: largest share of the mode's energy
   bool bending = false;     // whether bending rather than membrane stiffness dominates there
 };
+void fields(auto& archive, Like<TimeStepBound> auto& b) {
+  archive(b.dt, b.eigenvalue, b.relative_gap, b.cell, b.bending);
+}
 
 // Of the undamped, unprojected model at q, with the slope of the bending law at q's curvatures: a state that unbends
 // gets stiffer, so a run asks again. Cost: 20 to 60 applications of the tangent. Deterministic. Throws SolverError

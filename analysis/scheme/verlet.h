@@ -8,6 +8,7 @@
 #include "analysis/map/affine_map.h"
 #include "analysis/model/model.h"
 #include "analysis/projection/constraint_solver.h"
+#include "geometry/fields.h"
 
 namespace toile {
 
@@ -20,6 +21,9 @@ struct DynamicState {
   ConstraintForces constraint;
   Eigen::VectorXd q, f;  // [m], [N]; 3 n
 };
+void fields(auto& archive, Like<DynamicState> auto& s) {
+  archive(s.t, s.x, s.v, s.a, s.constraint, s.q, s.f);
+}
 
 // Dead loads on control points [N], 3 n: gravity on the true mass and tractions; wind [m/s] acts through drag.
 struct Loads {

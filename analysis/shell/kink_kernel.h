@@ -20,7 +20,7 @@
 namespace toile {
 
 // Width of the strip as part of the narrower neighbouring cell: a line makes the cloth softer by this part of a cell,
-// and where bending bounds the step, the bound falls to about a third. (analysis/README.md)
+// and where bending bounds the step, the bound falls to about a third. (analysis/shell/README.md, "C0 lines")
 constexpr double strip_width = 0.1;
 
 // One point with the functions that don't vanish there.

@@ -385,7 +385,7 @@ struct SharedWork {
   std::vector<PointEnergy<Lanes>> energy;  // per group
 };
 
-// Below this many quadrature points starting the threads costs what they save. (README, "Threads")
+// Below this many quadrature points starting the threads costs what they save. (analysis/shell/README.md, "Threads")
 constexpr std::size_t least_points_for_threads = 8000;
 
 }  // namespace

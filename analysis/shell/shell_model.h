@@ -14,7 +14,7 @@ namespace toile {
 
 // Quadrature that the shell asks for: p points a direction. What it integrates exactly (2 p - 1 in each direction)
 // keeps the order of convergence, no motion that full quadrature sees goes unseen, and p = 2 takes less than half as
-// long. Rational functions take p + 1. [Strang & Fix 1973, 4.3; analysis/README.md, "Quadrature"]
+// long. Rational functions take p + 1. [Strang & Fix 1973, 4.3; analysis/shell/README.md, "Quadrature"]
 QuadratureOptions shell_quadrature(const NurbsSurface& surface);
 
 struct ShellEnergy {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the program ends with. (README, "Exit codes")
+// What the program ends with. (pipeline/base/README.md, "Exit codes")
 #pragma once
 
 namespace toile {

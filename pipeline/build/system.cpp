@@ -60,7 +60,7 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
   const Eigen::SparseMatrix<double, Eigen::RowMajor> weighted = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
   const Eigen::SparseMatrix<double, Eigen::RowMajor> products =
       weighted * Eigen::SparseMatrix<double>(weighted.transpose());
-  // Row k of the Gram matrix by column; a place meets few others, and so do the rests that the factorisation leaves.
+  // Row k of the Gram matrix by column; a place meets few others, and so does the fill of the factorisation.
   std::vector<std::map<int, double>> gram(candidates.size());
   Eigen::VectorXd left(n);
   // A row that touches fixed control points only holds nothing new.

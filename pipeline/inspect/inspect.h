@@ -20,7 +20,7 @@ struct InspectOptions {
   std::optional<int> degree;
   std::optional<double> span;  // m, largest span length
   std::optional<int> spans;    // per direction
-  int threads = 0;             // panels are dealt out to them, same results; 0: one for each core
+  int threads = 0;             // they share the panels, same results; 0: one for each core
 };
 
 // The face's surface, clamped, with these degrees and knots. Throws GeometryError where they can't be had.

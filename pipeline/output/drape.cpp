@@ -239,7 +239,7 @@ int dry_run(Scene scene, bool json, Console& console) {
   TimeStepBound bound = time_step_bound(*built.model, *system->map, system->dynamic.node_mass, built.start);
   const double dt = planned_step(built.scene, bound);
   long long steps = 0;
-  std::vector<double> times;  // of a run until rest nobody knows
+  std::vector<double> times;  // unknown for a run until rest
   if (!built.scene.rest) times = frame_times(built.scene);
   for (std::size_t k = 1; k < times.size(); ++k) {
     steps += static_cast<long long>(std::ceil((times[k] - times[k - 1]) / dt * (1 - 1e-9)));

@@ -17,7 +17,7 @@ struct DrapeOptions {
   bool json = false;                            // the report on stdout
   int threads = 1;                              // of forces and tangents; any number gives the same bytes
   std::optional<std::filesystem::path> resume;  // a checkpoint to go on from
-  std::string command;  // that asked for this, to tell how to go on; without directory and checkpoint; empty: not told
+  std::string command;  // as typed, without directory and checkpoint, for the advice on how to resume; empty: no advice
 };
 
 // Runs a scene and writes its files; a scene that can't be built, and a checkpoint that doesn't fit, leave none.

@@ -38,7 +38,8 @@ class FrameWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-// report.json by the contract of the README. Only `seconds`, `counters` and `wall_*` differ between runs of one scene.
+// report.json as pipeline/output/README.md, "The report", says. Only `seconds`, `counters` and `wall_*` differ between
+// runs of one scene.
 nlohmann::ordered_json report_json(const Build& build, const RunResult& result, const StateMeasures& measures,
                                    double write_seconds);
 

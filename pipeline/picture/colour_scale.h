@@ -12,7 +12,7 @@
 namespace toile {
 
 // Colours from `low` to `high`; values beyond have the colours of the ends.
-//   (1) of values that nobody sees as negative, low = 0 has the darkest and high the lightest colour of
+//   (1) of values without negative ones, low = 0 has the darkest and high the lightest colour of
 //       strain_colour();
 //   (2) where values are negative too, zero is the pale middle of signed_colour() and both signs count by one measure:
 //       equal amounts are equally far from it;

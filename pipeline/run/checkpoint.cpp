@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <concepts>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -20,7 +19,7 @@ namespace toile {
 namespace {
 
 constexpr std::string_view first_word = "toile checkpoint ";
-constexpr int format_number = 5;  // raise it when the meaning of a byte changes
+constexpr int format_number = 6;  // raise it when the meaning of a byte changes
 
 // Every step can be undone, so that a change of any one word always shows in the end.
 std::uint64_t checksum(std::string_view bytes) {
@@ -38,51 +37,6 @@ std::uint64_t checksum(std::string_view bytes) {
   if (!bytes.empty()) std::memcpy(&rest, bytes.data(), bytes.size());
   mix(rest);
   return hash;
-}
-
-template <class T, class U>
-concept Like = std::same_as<std::remove_const_t<T>, U>;
-
-// What is kept of each struct, written and read alike. A new field is a word here.
-void fields(auto& archive, Like<ConstraintForces> auto& f) {
-  archive(f.strain, f.place);
-}
-void fields(auto& archive, Like<DynamicState> auto& s) {
-  archive(s.t, s.x, s.v, s.a, s.constraint, s.q, s.f);
-}
-void fields(auto& archive, Like<StrainRange> auto& r) {
-  archive(r.least, r.largest);
-}
-void fields(auto& archive, Like<LoopState> auto& s) {
-  archive(s.assembled, s.done, s.dt_scale, s.calm, s.patience, s.steps_since_bound, s.bound_every, s.strain,
-          s.strain_at_bound, s.scale, s.balance, s.trough, s.rounding, s.kick);
-}
-void fields(auto& archive, Like<Cell> auto& c) {
-  archive(c.panel, c.i, c.j);
-}
-void fields(auto& archive, Like<TimeStepBound> auto& b) {
-  archive(b.dt, b.eigenvalue, b.relative_gap, b.cell, b.bending);
-}
-void fields(auto& archive, Like<EnergyBalance> auto& e) {
-  archive(e.kinetic, e.stored, e.start, e.load_work, e.drag_work, e.motion_work, e.gravity, e.injected);
-}
-void fields(auto& archive, Like<ProjectionReport> auto& r) {
-  archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);
-}
-void fields(auto& archive, Like<Relaxation> auto& r) {
-  archive(r.steps, r.halts, r.trials, r.remaining, r.dt_share, r.trial, r.length, r.count, r.moved, r.kinetic,
-          r.halts_before, r.from);
-}
-void fields(auto& archive, Like<RunState> auto& s) {
-  archive(s.state, s.loop, s.relaxing, s.relaxation, s.frames, s.steps, s.redone_steps, s.frame_times, s.dt_min,
-          s.dt_max, s.dt_last, s.bound, s.energy, s.iterations_sum, s.iterations_max, s.unconverged_steps,
-          s.last_projection, s.warnings);
-}
-void fields(auto& archive, Like<SceneMark> auto& s) {
-  archive(s.keys, s.control_points);
-}
-void fields(auto& archive, Like<ProjectionMemory> auto& m) {
-  archive(m.strain_multipliers, m.place_multipliers, m.strain_impulses);
 }
 
 class Writer {
@@ -282,7 +236,7 @@ RunResult parse_checkpoint(std::string_view bytes, const std::string& name, cons
   RunResult result;
   RunState& state = result;
   reader(state);
-  result.system = assemble(build, state.loop.assembled, workers);
+  result.system = assemble(build, state.assembled, workers);
   const System& system = *result.system;
   ProjectionMemory memory;
   if (system.projection) reader(memory);

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "geometry/fields.h"
 #include "pipeline/run/run.h"
 
 namespace toile {
@@ -21,6 +22,9 @@ struct SceneMark {
   std::map<std::string, std::string> keys;  // that change what the cloth does; contents in place of file names
   std::uint64_t control_points = 0;         // other programs may make others of the same files
 };
+void fields(auto& archive, Like<SceneMark> auto& s) {
+  archive(s.keys, s.control_points);
+}
 SceneMark scene_mark(const Build& build);
 
 std::string format_checkpoint(const SceneMark& scene, const RunState& state, const System& system);

@@ -13,67 +13,52 @@
 namespace toile {
 namespace {
 
-constexpr double step_safety = 0.9;   // of the eigenvalue bound
-constexpr int bound_every = 100;      // steps; the bound costs some 25 forces
-constexpr int bound_rarely = 400;     // steps
-constexpr int most_patience = 10000;  // steps
-constexpr double bound_holds = 0.01;  // change of the step, from one bound to the next, far less than the safety takes
-constexpr double stiffening = 0.2;    // of the cloth since the last bound: nearly what the safety takes
-// A step whose projection had to damp was too large for accuracy: the next are smaller by this, down to a share of the
-// plan.
-constexpr double damped_scale = 0.8, smallest_damped = 0.25;
-constexpr double rest_share = 1e-4;            // of the largest panel, of the tolerance of rest
-constexpr double smallest_scale = 1.0 / 1024;  // ten halvings of the planned step
-// Of the energy turned over: in a step and in all. A step that the bound chooses is made smaller for less, down to a
-// share of it, unless the limit is hard, which leaves more in smaller ones.
-constexpr double step_rise = 0.05, total_rise = 0.2;
-constexpr double small_rise = 0.005, smallest_careful = 1.0 / 16;
-constexpr int first_steps = 10;  // little is turned over yet, so that a part of it is nothing
+constexpr double rest_share = 1e-4;  // of the largest panel, of the tolerance of rest
+// A step that the bound chooses is made smaller for a small rise of the energy, down to a share of the bound, unless
+// the limit is hard, which leaves more in smaller ones. At first too little energy has been exchanged for a relative
+// test.
+constexpr double smallest_careful = 1.0 / 16;
+constexpr int first_steps = 10;
 
-// Kinetic energy that nobody sees: of cloth that would cross its own distance from the origin in 1e8 s, or that moves
-// by the rounding of its places in a step. Without loads there is nothing else to compare a rise with.
-double rounding_energy(const MechanicalSystem& system, const Eigen::VectorXd& q, double dt) {
-  constexpr double epsilon = std::numeric_limits<double>::epsilon();
-  const double speed = q.lpNorm<Eigen::Infinity>() * (1e-8 + (dt > 0 ? 64 * epsilon / dt : 0));
-  return 0.5 * system.node_mass.sum() * speed * speed;
-}
+}  // namespace
 
-class Loop {
+class Run::Impl {
  public:
-  // Without a system, `from` is a run that has yet to begin.
-  Loop(const Build& build, RunResult from, const RunHooks& hooks)
-      : build_(build), scene_(build.scene), hooks_(hooks), result_(std::move(from)) {
+  Impl(const Build& build, RunHooks hooks, RunResult from, std::unique_ptr<System> start)
+      : build_(build),
+        scene_(build.scene),
+        hooks_(std::move(hooks)),
+        start_system_(std::move(start)),
+        result_(std::move(from)) {
     result_.from = result_.state.t;
-  }
-  Loop(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks) : Loop(build, RunResult(), hooks) {
-    start_system_ = std::move(start);
+    if (result_.system) require_time_left(build_, result_);
   }
 
-  RunResult operator()() {
-    if (result_.system) {
-      require_time_left(build_, result_);
-      // The forces of a run with another kind of end are others.
-      if (result_.relaxing != scene_.rest.has_value()) initialise(result_.system->dynamic, result_.state);
-    } else {
-      begin();
-      emit_frame();
-      finish_target(0);
+  bool finished() const { return over_; }
+  const RunResult& now() const { return result_; }
+
+  void step() {
+    if (over_) return;
+    if (!begun_) start();
+    const std::optional<double> target = schedule().next_target();
+    if (!target) {
+      over_ = true;
+      return;
     }
-    result_.relaxing = scene_.rest.has_value();
-    while (const auto target = next_target()) {
-      while (result_.exit == RunExit::ok && result_.state.t < *target && !over()) advance(*target);
-      if (result_.exit != RunExit::ok) break;
-      if (result_.state.t < *target) {
-        // Ends before its time. A run that goes on from here has no frame now.
-        result_.accepted = RunState(result_);
-        if (result_.loop.done < result_.state.t) emit_frame();
-        result_.loop.done = result_.state.t;
-        break;
-      }
-      release(*target);
-      if (*target == next_frame()) emit_frame();
-      finish_target(*target);
+    if (result_.state.t < *target && !ends_early()) advance(*target);
+    if (result_.exit != RunExit::ok) {
+      over_ = true;
+    } else if (result_.state.t >= *target) {
+      arrive(*target);
+      over_ = !schedule().next_target();
+    } else if (ends_early()) {
+      end_early();
     }
+  }
+
+  RunResult finish() {
+    over_ = true;
+    if (!begun_) start();
     if (result_.exit == RunExit::ok && !result_.last_projection.converged) report_limit();
     if (result_.exit == RunExit::ok && scene_.rest && !at_rest()) report_unrest();
     if (result_.exit == RunExit::ok) check_energy();
@@ -84,6 +69,31 @@ class Loop {
   }
 
  private:
+  void start() {
+    begun_ = true;
+    if (result_.system) {
+      // The forces of a run with another kind of end are others.
+      if (result_.relaxing != scene_.rest.has_value()) initialise(result_.system->dynamic, result_.state);
+    } else {
+      begin();
+      emit_frame();
+      finish_target(0);
+    }
+    result_.relaxing = scene_.rest.has_value();
+  }
+  void arrive(double target) {
+    release(target);
+    if (target == schedule().next_frame()) emit_frame();
+    finish_target(target);
+  }
+  // Ends before its time. A run that goes on from here has no frame now.
+  void end_early() {
+    result_.accepted = RunState(result_);
+    if (result_.done < result_.state.t) emit_frame();
+    result_.done = result_.state.t;
+    over_ = true;
+  }
+
   void begin() {
     result_.system = start_system_ ? std::move(start_system_) : assemble(build_, 0, hooks_.workers);
     result_.warnings = result_.system->warnings;
@@ -98,11 +108,11 @@ class Loop {
     result_.energy.stored = elastic.energy;
     result_.energy.stored.set("limit", limit_energy());
     result_.energy.start = result_.energy.elastic();
-    result_.loop.scale = result_.energy.start;
-    result_.loop.strain = elastic.strain;
+    result_.watch.exchanged = result_.energy.start;
+    result_.control.strain = elastic.strain;
     evaluate_bound();
     if (scene_.dt) hold_to_bound();
-    result_.loop.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
+    result_.watch.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
   }
 
   // Nets that don't follow the threads lock where rows are stiff. (analysis/README.md, "Which rows")
@@ -124,56 +134,25 @@ class Loop {
     if (hooks_.resumable) hooks_.resumable(result_);
   }
   void finish_target(double t) {
-    result_.loop.done = t;
+    result_.done = t;
     resumable();
   }
 
-  // Not dealt with yet.
-  bool open(double t) const { return t > result_.loop.done && t >= result_.state.t; }
-  // The next frame that has a time beforehand; none after the end.
-  std::optional<double> next_frame() const {
-    if (!open(scene_.until)) return std::nullopt;
-    double k = std::max(0.0, std::floor(result_.state.t / scene_.every) - 1);
-    while (!open(k * scene_.every)) ++k;
-    const double t = k * scene_.every;
-    return t < scene_.until * (1 - 1e-9) ? t : scene_.until;
-  }
-  // The next time that steps land on.
-  std::optional<double> next_target() const {
-    std::optional<double> next = next_frame();
-    for (const ScenePin& pin : scene_.pins) {
-      if (next && pin.release && *pin.release > 0 && open(*pin.release)) next = std::min(*next, *pin.release);
-    }
-    return next;
-  }
+  Schedule schedule() const { return {scene_, result_.state.t, result_.done}; }
 
   bool at_rest() const { return scene_.rest && result_.relaxation.remaining <= tolerance_; }
   // Before its time: at rest, or at the end of the steps that it may take to get there.
-  bool over() const { return at_rest() || (scene_.rest && result_.relaxation.steps >= scene_.rest->max_steps); }
-  // When pins no longer move and are no longer let go.
-  double pins_done() const {
-    double t = 0;
-    for (const ScenePin& pin : scene_.pins) {
-      if (pin.move) t = std::max(t, pin.release ? std::min(*pin.release, pin.move->end) : pin.move->end);
-      if (pin.release) t = std::max(t, *pin.release);
-    }
-    return t;
-  }
-
+  bool ends_early() const { return at_rest() || (scene_.rest && result_.relaxation.steps >= scene_.rest->max_steps); }
   void evaluate_bound() {
-    LoopState& loop = result_.loop;
-    const bool in_turn = loop.dt_scale == 1 && loop.steps_since_bound >= loop.bound_every;
+    StepControl& control = result_.control;
     const double before = result_.bound.dt;
-    const int kept = loop.bound_every;
-    loop.steps_since_bound = 0;
-    loop.bound_every = bound_every;
-    const bool held = bounded();
-    if (!held && !stiffer(loop.strain, loop.strain_at_bound, stiffening)) return;
-    loop.strain_at_bound = loop.strain;
+    const int interval = control.bound_every;
+    const bool in_turn = control.begin_bound(), held = bounded();
+    if (!held && !control.stiffened()) return;
+    control.strain_at_bound = control.strain;
     if (!held) return hold_to_bound();
     result_.bound = ask_for_bound();
-    if (in_turn && std::abs(result_.bound.dt / before - 1) <= bound_holds)
-      loop.bound_every = std::min(2 * kept, bound_rarely);
+    if (in_turn) control.settle_interval(interval, before, result_.bound.dt);
   }
   TimeStepBound ask_for_bound() {
     const Clock::time_point start = Clock::now();
@@ -212,8 +191,8 @@ class Loop {
     return system.projection ? system.projection->energy(result_.state.x, result_.state.t) : 0;
   }
   void advance(double target) {
-    if (result_.loop.steps_since_bound >= result_.loop.bound_every) evaluate_bound();
-    double largest = result_.loop.dt_scale * largest_step();
+    if (result_.control.bound_is_due()) evaluate_bound();
+    double largest = result_.control.scale * largest_step();
     if (!scene_.dt) largest *= result_.relaxation.dt_share;
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
@@ -225,10 +204,10 @@ class Loop {
       return;
     }
     for (bool halved = false;; halved = true) {
-      const StepReport report = step(result_.system->dynamic, result_.state, dt, work_);
+      const StepReport report = toile::step(result_.system->dynamic, result_.state, dt, work_);
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
-      const std::string trouble = judge(report);
+      const std::string trouble = judge(result_.watch, result_.energy, report, result_.dt_last, careful());
       if (trouble.empty()) {
         accept(report);
         if (scene_.rest) relax_after(report);
@@ -240,15 +219,14 @@ class Loop {
       if (!halved) result_.accepted = RunState(result_);
       if (!bounded()) hold_to_bound();
       ++result_.redone_steps;
-      result_.loop.calm = 0;
-      result_.loop.trough = result_.loop.balance;
-      if (!halved) result_.loop.patience = std::min(2 * result_.loop.patience, most_patience);
-      if (result_.loop.dt_scale <= smallest_scale) {
+      result_.control.refuse(!halved);
+      result_.watch.trough = result_.watch.balance;
+      if (result_.control.exhausted()) {
         fail(fmt::format("{}, even with a step of {:.3g} s", trouble, dt));
         return;
       }
       dt = std::min(dt / 2, largest_step());
-      result_.loop.dt_scale /= 2;
+      result_.control.scale /= 2;
     }
     if (hooks_.progress) hooks_.progress({result_.state.t, scene_.until, dt, result_.steps, result_.frames});
     result_.accepted.reset();
@@ -265,8 +243,8 @@ class Loop {
     Relaxation& relaxation = result_.relaxation;
     if (relax(result_.system->dynamic, work_, report, tolerance_, result_.state, relaxation)) {
       result_.energy.kinetic = 0;
-      result_.loop.balance -= report.kinetic;
-      result_.loop.trough = result_.loop.balance;
+      result_.watch.balance -= report.kinetic;
+      result_.watch.trough = result_.watch.balance;
     }
     if (result_.state.t < pins_done_) restart(relaxation);
   }
@@ -286,17 +264,17 @@ class Loop {
   // Less than what ends a run, but more than a stable one gains.
   void check_energy() {
     const EnergyBalance& e = result_.energy;
-    const double turned = result_.loop.scale;
-    if (!(e.injected > scene_.energy_gain * turned) || !(e.injected > result_.loop.rounding)) return;
+    const double exchanged = result_.watch.exchanged;
+    if (!(e.injected > scene_.energy_gain * exchanged) || !(e.injected > result_.watch.rounding)) return;
     result_.exit = RunExit::check_failed;
     result_.reason = fmt::format(
         "the energy grew by {:.2g} % of the energy exchanged with no matching work, allowed are {:.2g} % "
         "(solver.energy_gain): a smaller dt or a lower strain_limit.stiffness is more accurate",
-        100 * e.injected / turned, 100 * scene_.energy_gain);
+        100 * e.injected / exchanged, 100 * scene_.energy_gain);
   }
 
-  // A start that breaks the limits is moved onto them, at rest: a step would turn the rest into a velocity of rest /
-  // dt.
+  // A start that breaks the limits is moved onto them, at rest: a step would turn what is left into a velocity of
+  // violation / dt.
   void settle() {
     const System& system = *result_.system;
     if (!system.projection || system.projection->measure(result_.state.x, 0).converged) return;
@@ -306,49 +284,13 @@ class Loop {
     initialise(system.dynamic, result_.state);
   }
 
-  // Why a step can't be accepted; empty where it can.
-  std::string judge(const StepReport& report) {
-    if (!report.finite) return "the numbers are no longer finite";
-    const EnergyBalance& e = result_.energy;
-    const double elastic = report.elastic.total() + report.limit_energy;
-    const double now = report.kinetic + 0.5 * (e.elastic() + elastic);
-    const double work =
-        e.load_work + e.drag_work + e.motion_work + 0.5 * (report.load_work + report.drag_work + report.motion_work);
-    const double balance = now - e.start - work;
-    const double turned = std::max({result_.loop.scale, std::abs(e.load_work + report.load_work),
-                                    std::abs(e.motion_work + report.motion_work), std::abs(e.drag_work), e.now()});
-    const double smaller_step = report.dt < (1 - 1e-9) * result_.dt_last ? result_.loop.kick : 0;
-    const bool careful =
-        bounded() && !hard_limit() && result_.loop.dt_scale > smallest_careful && result_.steps >= first_steps;
-    const double rise = balance - (careful ? result_.loop.trough : result_.loop.balance);
-    if (rise > (careful ? small_rise : step_rise) * turned + smaller_step + result_.loop.rounding) {
-      return fmt::format("energy grew by {:.3g} J with no matching work ({:.3g} J exchanged so far)", rise, turned);
-    }
-    // What the end of the step holds can't exceed the budget either.
-    const double stored = report.kinetic_end + elastic - e.start - e.load_work - e.drag_work - e.motion_work -
-                          report.load_work - report.drag_work - report.motion_work;
-    if (std::max(balance, stored) > total_rise * turned + result_.loop.rounding) {
-      return fmt::format("energy has grown by {:.3g} J with no matching work ({:.3g} J exchanged so far)",
-                         std::max(balance, stored), turned);
-    }
-    result_.loop.scale = turned;
-    result_.loop.kick = report.kick;
-    // What a smaller step seems to gain is no rise.
-    result_.loop.trough += std::clamp(balance - result_.loop.balance, 0.0, smaller_step);
-    result_.loop.trough = careful ? std::min(result_.loop.trough, balance) : balance;
-    result_.loop.balance = balance;
-    return {};
+  // Steps that the bound chooses are refused for less, if a smaller one would be better.
+  bool careful() const {
+    return bounded() && !hard_limit() && result_.control.scale > smallest_careful && result_.steps >= first_steps;
   }
 
   void accept(const StepReport& report) {
-    EnergyBalance& e = result_.energy;
-    e.kinetic = report.kinetic;
-    e.stored = report.elastic.energy;
-    e.stored.set("limit", report.limit_energy);
-    e.load_work += report.load_work;
-    e.drag_work += report.drag_work;
-    e.motion_work += report.motion_work;
-    e.injected = std::max(e.injected, result_.loop.balance);
+    add_step(result_.energy, report, result_.watch);
     result_.dt_min = result_.steps == 0 ? report.dt : std::min(result_.dt_min, report.dt);
     result_.dt_max = std::max(result_.dt_max, report.dt);
     result_.dt_last = report.dt;
@@ -356,19 +298,8 @@ class Loop {
     result_.iterations_sum += report.projection.iterations;
     result_.iterations_max = std::max(result_.iterations_max, report.projection.iterations);
     if (!report.projection.converged) ++result_.unconverged_steps;
-    if (!scene_.dt && report.projection.damped && result_.loop.dt_scale > smallest_damped) {
-      result_.loop.dt_scale = std::max(smallest_damped, damped_scale * result_.loop.dt_scale);
-    }
-    // Larger again, but each time that this proved too early later.
-    if (++result_.loop.calm >= result_.loop.patience) {
-      result_.loop.calm = 0;
-      result_.loop.dt_scale = std::min(1.0, 2 * result_.loop.dt_scale);
-    }
+    result_.control.accept(report.elastic.strain, !scene_.dt && report.projection.damped);
     ++result_.steps;
-    ++result_.loop.steps_since_bound;
-    result_.loop.strain = report.elastic.strain;
-    if (stiffer(result_.loop.strain, result_.loop.strain_at_bound, stiffening))
-      result_.loop.steps_since_bound = result_.loop.bound_every;
   }
 
   void release(double t) {
@@ -378,7 +309,7 @@ class Loop {
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
     result_.system = assemble(build_, t, hooks_.workers);
-    result_.loop.assembled = t;
+    result_.assembled = t;
     result_.state = state_from(*result_.system, q, v, t);
     // The released control points' kinetic energy joins the balance.
     double kinetic = 0;
@@ -458,14 +389,41 @@ class Loop {
 
   const Build& build_;
   const Scene& scene_;
-  const RunHooks& hooks_;
+  const RunHooks hooks_;
   std::unique_ptr<System> start_system_;  // null: begin() assembles it
   RunResult result_;
   const double tolerance_ = rest_tolerance(build_);
-  const double pins_done_ = pins_done();
+  const double pins_done_ = pins_done(scene_);
+  bool begun_ = false, over_ = false;
   StepWork work_;
   const Clock::time_point start_ = Clock::now();
 };
+
+Run::Run(const Build& build, RunHooks hooks, std::unique_ptr<System> start)
+    : impl_(std::make_unique<Impl>(build, std::move(hooks), RunResult(), std::move(start))) {}
+Run::Run(const Build& build, RunHooks hooks, RunResult from)
+    : impl_(std::make_unique<Impl>(build, std::move(hooks), std::move(from), nullptr)) {}
+Run::~Run() = default;
+
+bool Run::finished() const {
+  return impl_->finished();
+}
+void Run::step() {
+  impl_->step();
+}
+const RunResult& Run::now() const {
+  return impl_->now();
+}
+RunResult Run::finish() {
+  return impl_->finish();
+}
+
+namespace {
+
+RunResult to_the_end(Run& run) {
+  while (!run.finished()) run.step();
+  return run.finish();
+}
 
 }  // namespace
 
@@ -491,18 +449,6 @@ double rest_tolerance(const Build& build) {
   double largest = 0;
   for (const ClothPanel& panel : build.model->panels()) largest = std::max(largest, extent(panel));
   return rest_share * largest;
-}
-
-std::vector<double> frame_times(const Scene& scene) {
-  if (!std::isfinite(scene.until)) throw std::logic_error("a run until rest has no last frame");
-  std::vector<double> times;
-  for (int k = 0;; ++k) {
-    const double t = k * scene.every;
-    if (t >= scene.until * (1 - 1e-9)) break;
-    times.push_back(t);
-  }
-  times.push_back(scene.until);
-  return times;
 }
 
 double planned_step(const Scene& scene, const TimeStepBound& bound) {
@@ -534,15 +480,18 @@ double gravity_potential(const Build& build, const Eigen::VectorXd& q) {
 }
 
 RunResult run(const Build& build, const RunHooks& hooks) {
-  return Loop(build, RunResult(), hooks)();
+  Run whole(build, hooks);
+  return to_the_end(whole);
 }
 
 RunResult run(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks) {
-  return Loop(build, std::move(start), hooks)();
+  Run whole(build, hooks, std::move(start));
+  return to_the_end(whole);
 }
 
 RunResult run(const Build& build, RunResult from, const RunHooks& hooks) {
-  return Loop(build, std::move(from), hooks)();
+  Run whole(build, hooks, std::move(from));
+  return to_the_end(whole);
 }
 
 }  // namespace toile

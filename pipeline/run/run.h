@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The step loop: from the start to `until`, frame by frame, with energy and finiteness watched.
+// A run: from the start to `until`, frame by frame, with energy and finiteness watched. It can be stepped from outside.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,11 @@
 
 #include "analysis/scheme/relaxation.h"
 #include "analysis/scheme/time_step.h"
+#include "geometry/fields.h"
 #include "pipeline/build/system.h"
+#include "pipeline/run/energy_watch.h"
+#include "pipeline/run/schedule.h"
+#include "pipeline/run/step_control.h"
 
 namespace toile {
 
@@ -33,39 +37,13 @@ struct RunProgress {
   int steps = 0, frames = 0;
 };
 
-struct EnergyBalance {
-  double kinetic = 0;                                    // J, in the middle of the last step
-  EnergyParts stored;                                    // J, now: the potentials', and "limit" of the strain limits
-  double start = 0;                                      // J, kinetic and elastic at the start
-  double load_work = 0, drag_work = 0, motion_work = 0;  // J, since the start
-  double gravity = 0;                                    // J, potential against the start; at the end of a run
-  double injected = 0;  // J, largest rise of the balance above the start, 0 where it never rose
-  double elastic() const { return stored.total(); }
-  double now() const { return kinetic + elastic(); }
-  // What drag took, and with it the step: damping by the strain limit, or less than nothing where energy rose.
-  double dissipated() const { return start + load_work + motion_work - now(); }
-  double numerical() const { return dissipated() + drag_work; }
-};
-
-// What the step loop carries from step to step besides the state of the cloth.
-struct LoopState {
-  double assembled = 0;                        // s, time whose pins hold
-  double done = -1;                            // s, last frame or release time that is dealt with; none at first
-  double dt_scale = 1;                         // of the planned step
-  int calm = 0, patience = 100;                // steps since one was refused or the scale rose; until it rises
-  int steps_since_bound = 0, bound_every = 0;  // steps
-  StrainRange strain, strain_at_bound;         // now, and when the bound was asked for
-  double scale = 0, balance = 0;               // J, energy turned over; unexplained rise
-  double trough = 0;                           // J, lowest balance since a step was refused
-  double rounding = 0;                         // J, that nobody sees
-  double kick = 0;                             // J, of the last accepted step: what a smaller step may seem to gain
-};
-
-// All of a run that a later one needs to go on with the same bits, and nothing that depends on the clock. A field more:
-// a word in checkpoint.cpp.
+// Everything needed to resume bit for bit, and nothing that depends on the clock.
 struct RunState {
   DynamicState state;
-  LoopState loop;
+  double assembled = 0;  // s, time whose pins hold
+  double done = -1;      // s, last frame or release time that is dealt with; none at first
+  StepControl control;
+  EnergyWatch watch;
   bool relaxing = false;  // on the way to rest: without drag
   Relaxation relaxation;
   int frames = 0, steps = 0, redone_steps = 0;
@@ -78,6 +56,12 @@ struct RunState {
   ProjectionReport last_projection;
   std::vector<std::string> warnings;
 };
+
+void fields(auto& archive, Like<RunState> auto& s) {
+  archive(s.state, s.assembled, s.done, s.control, s.watch, s.relaxing, s.relaxation, s.frames, s.steps, s.redone_steps,
+          s.frame_times, s.dt_min, s.dt_max, s.dt_last, s.bound, s.energy, s.iterations_sum, s.iterations_max,
+          s.unconverged_steps, s.last_projection, s.warnings);
+}
 
 struct RunResult : RunState {
   RunExit exit = RunExit::ok;
@@ -107,33 +91,50 @@ double gravity_potential(const Build& build, const Eigen::VectorXd& q);
 // So far may material points swing when let go at the end of a run until rest [m].
 double rest_tolerance(const Build& build);
 
-// Steps land on frame times and release times. With `dt` unset the step is 0.9 of the eigenvalue bound of the present
-// state, evaluated anew every 100 steps, and less often, up to every 400, where it hardly changes, at once where cloth
-// is stretched or squeezed so far that it is stiffer by a fifth; where the projection had to damp, less. A `dt` of the
-// scene that is more than the bound at the start, or proves too large, is held to the bound likewise.
-//   (1) every number of an accepted step is finite;
-//   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises from
-//       step to step by no more than 5 % of the energy turned over so far, and in all by no more than 20 %. Steps that
-//       follow the bound are refused for half a percent since one was last refused, down to a sixteenth of the bound.
-//       A step that breaks this is redone with half the step, ten times at most, then the run ends as solver_failed at
-//       the last accepted state. Steps grow again after 100 quiet ones, after twice as many each time.
-//   (3) a finished run whose energy rose by more than Scene::energy_gain of the most that was turned over is
-//       check_failed.
+// Steps land on frame times and release times (Schedule). With `dt` unset the step is 0.9 of the stable step of the
+// present state, asked for anew and scaled by StepControl. A `dt` of the scene that is more than is stable at the
+// start, or proves too large, is held to the stable step likewise.
+//   (1) every accepted step passes EnergyWatch; one that doesn't is redone with half the step, ten times at most, then
+//       the run ends as solver_failed at the last accepted state;
+//   (2) a finished run whose energy rose by more than Scene::energy_gain of the most that was exchanged is
+//       check_failed;
+//   (3) no decision depends on time of day, addresses or thread count.
 // Until rest: without drag, halted at each peak of the kinetic energy; time is that of no real motion. Once all motions
 // and releases of pins are over, the run ends where `Relaxation::remaining` is within rest_tolerance(), with a frame of
 // its own, or as check_failed after max_steps.
-// The step is deterministic: no decision depends on time of day, addresses or thread count.
-RunResult run(const Build& build, const RunHooks& hooks = {});
-// The same with what assemble(build, 0, hooks.workers) gave.
-RunResult run(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks = {});
+class Run {
+ public:
+  // `start`: what assemble(build, 0, hooks.workers) gave; null: assembled here. Nothing is done before the first step.
+  // `build` must outlive the run.
+  explicit Run(const Build& build, RunHooks hooks = {}, std::unique_ptr<System> start = nullptr);
+  // Goes on from a run of the same build (read_checkpoint): the end is that of a run that never stopped, to the bit,
+  // unless `until` or `every` are others now. Throws InputError where `until` has passed already.
+  Run(const Build& build, RunHooks hooks, RunResult from);
+  ~Run();
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
 
-// Goes on from a run of the same build (read_checkpoint): the end is that of a run that never stopped, to the bit,
-// unless `until` or `every` are others now. Throws InputError where `until` has passed already.
+  // True once there is nothing to do: the end is reached, the cloth is at rest, or the run can't go on.
+  bool finished() const;
+  // One step of the cloth, and the frames and releases that its end brings. The first call also makes the start with
+  // its frame. Nothing once finished.
+  void step();
+  const RunResult& now() const;  // as far as it is
+  // What the run comes to: the last state, and the verdict on it. Ends the run.
+  RunResult finish();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// A whole run: steps until it is finished.
+RunResult run(const Build& build, const RunHooks& hooks = {});
+RunResult run(const Build& build, std::unique_ptr<System> start, const RunHooks& hooks = {});
 RunResult run(const Build& build, RunResult from, const RunHooks& hooks = {});
 void require_time_left(const Build& build, const RunState& state);
 
-// For a dry run: times of the frames of a scene with an end.
-std::vector<double> frame_times(const Scene& scene);
+// s, before the control's scale.
 double planned_step(const Scene& scene, const TimeStepBound& bound);
 
 // "panel 'front', cell (3, 4), u in [0.3, 0.4], v in [0.4, 0.5]".

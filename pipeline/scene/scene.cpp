@@ -680,8 +680,13 @@ std::optional<double> draping_span(const TrimmedSurface& face) {
 }  // namespace
 
 Scene quick_scene(const QuickScene& request, std::span<const std::string> settings) {
-  const auto read =
-      std::make_shared<const ReadFile>(ReadFile{read_panels(request.file, request.choice), request.choice});
+  return quick_scene(
+      request, std::make_shared<const ReadFile>(ReadFile{read_panels(request.file, request.choice), request.choice}),
+      settings);
+}
+
+Scene quick_scene(const QuickScene& request, std::shared_ptr<const ReadFile> read,
+                  std::span<const std::string> settings) {
   const PanelFile& file = read->file;
   const auto has = [&](const std::string& name) {
     return std::ranges::any_of(file.panels, [&](const TrimmedSurface& face) { return face.name == name; });

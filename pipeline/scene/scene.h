@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The scene file: what is draped, of what, held where, for how long. (README, "The scene file")
+// The scene file: what is draped, of what, held where, for how long. (pipeline/scene/README.md, "The scene file")
 #pragma once
 
 #include <Eigen/Core>
@@ -146,7 +146,7 @@ struct Scene {
   Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
   Eigen::Vector3d wind{0, 0, 0};         // m/s
   std::optional<double> dt;              // s; unset: chosen from the eigenvalue bound
-  double energy_gain = 0.01;             // unexplained rise of the energy, of what was turned over, that a run may have
+  double energy_gain = 0.01;             // allowed unexplained growth of energy, as a share of the energy exchanged
   double until = 1;                      // s; infinite where `rest` ends the run
   std::optional<SceneRest> rest;         // set: until the cloth is at rest
   std::optional<double> time_limit;      // s of wall time for the program; unset: none
@@ -175,6 +175,9 @@ struct QuickScene {
   std::string fabric = "kidnapped";
 };
 Scene quick_scene(const QuickScene& request, std::span<const std::string> settings = {});
+// The same of a file that has been read already, or that is nowhere on disk.
+Scene quick_scene(const QuickScene& request, std::shared_ptr<const ReadFile> read,
+                  std::span<const std::string> settings = {});
 
 // Names in draped.igs: the flat face of panel "front" is "front flat", the draped one "front draped".
 inline constexpr std::string_view flat_suffix = " flat";

@@ -228,7 +228,7 @@ void check_errors(const Study& study, StudyResult& result) {
       StudyRun& run = r.cases[k].runs[r.cases[k].first.value_or(0)];
       const bool reached = run.error && *run.error <= *study.largest_error;
       if (study.stability) {
-        // A reference that isn't there is nobody's fault but the study's.
+        // A missing reference is an error in the study, not in the run.
         if (run.verdict != Verdict::stable || series.reference.kind == StudyReference::Kind::none || reached) continue;
         run.verdict = Verdict::bad;
         run.cause = run.error ? fmt::format("the {} is off by {:.3g}, allowed {:.3g}", series.quantity.name, *run.error,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// JSON schemas of scenes and studies, for editors that complete and check TOML. (README, "The scene file", "Studies")
+// JSON schemas of scenes and studies, for editors that complete and check TOML. (pipeline/scene/README.md,
+// pipeline/study/README.md)
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -13,7 +14,7 @@ namespace toile {
 // that has every table; schema_words() adds meaning and defaults.
 //   (1) a key is in the schema if and only if the reader knows it;
 //   (2) a file that the reader takes fits the schema. The converse doesn't hold: files, names, addresses and what
-//   depends on several keys only the reader checks.
+//       depends on several keys only the reader checks.
 nlohmann::ordered_json scene_schema();
 nlohmann::ordered_json study_schema();
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A study: one scene run many times with something varied, each run a process of its own, judged against a reference
-// (kind "convergence") or for being stable, refused or stopped with a cause (kind "stability"). (README, "Studies")
+// (kind "convergence") or for being stable, refused or stopped with a cause (kind "stability").
+// (pipeline/study/README.md)
 #pragma once
 
 #include <Eigen/Core>

@@ -108,7 +108,7 @@ TEST(Resume, EveryPlaceLeadsToTheSameBytes) {
   for (std::size_t k = 1; k < count; ++k) {  // beside the release
     const RunResult before = parse_checkpoint(whole.checkpoints[k - 1], "a", b),
                     at = parse_checkpoint(whole.checkpoints[k], "b", b);
-    if (before.loop.assembled != at.loop.assembled) places.insert(places.end(), {k - 2, k - 1, k, k + 1});
+    if (before.assembled != at.assembled) places.insert(places.end(), {k - 2, k - 1, k, k + 1});
   }
   for (const std::size_t k : places) {
     const Left resumed = resumed_run(b, whole.checkpoints[k]);

@@ -194,7 +194,7 @@ TEST(Run, TheStepBoundIsAskedForLessOftenWhereItHolds) {
   falling.scene.strain_limit.on = false;
   const RunResult at_rest = run(quiet);
   ASSERT_GT(at_rest.steps, 700);
-  EXPECT_EQ(at_rest.loop.bound_every, 400);
+  EXPECT_EQ(at_rest.control.bound_every, 400);
 
   // Cloth that stretches and folds changes its stiffness.
   double bound = 0;
@@ -203,7 +203,7 @@ TEST(Run, TheStepBoundIsAskedForLessOftenWhereItHolds) {
   hooks.resumable = [&](const RunResult& r) {
     if (bound > 0 && std::abs(r.bound.dt / bound - 1) > 0.01) {
       ++changes;
-      EXPECT_EQ(r.loop.bound_every, 100);
+      EXPECT_EQ(r.control.bound_every, 100);
     }
     bound = r.bound.dt;
   };
@@ -283,7 +283,7 @@ TEST(Run, AStepOfTheSceneIsHeldToTheBoundOfClothThatStiffens) {
   EXPECT_LE(named.redone_steps, automatic.redone_steps + 1);
 }
 
-// What wind does is turned over too: a gain is compared with it where there is no other work.
+// Work of wind is energy exchanged too: a gain is compared with it where there is no other work.
 TEST(Run, TheWorkOfWindIsWork) {
   const Folder folder("wind");
   Build b = built(folder, test::sheet("cloth"),
@@ -294,7 +294,7 @@ TEST(Run, TheWorkOfWindIsWork) {
   EXPECT_EQ(blown.exit, RunExit::ok) << blown.reason;
   EXPECT_GT(blown.energy.drag_work, 0);
   EXPECT_EQ(blown.energy.load_work, 0);
-  EXPECT_GT(blown.energy.injected, blown.loop.rounding) << "or nothing is judged";
+  EXPECT_GT(blown.energy.injected, blown.watch.rounding) << "or nothing is judged";
 }
 
 TEST(Run, EnergyFromNowhereFailsACheck) {
@@ -305,7 +305,7 @@ TEST(Run, EnergyFromNowhereFailsACheck) {
   b.scene.until = 0.2;
   const RunResult allowed = run(b);
   ASSERT_EQ(allowed.exit, RunExit::ok) << allowed.reason;
-  const double gained = allowed.energy.injected / allowed.loop.scale;
+  const double gained = allowed.energy.injected / allowed.watch.exchanged;
   ASSERT_GT(gained, 0);
   b.scene.energy_gain = 0.9 * gained;
   const RunResult refused = run(b);

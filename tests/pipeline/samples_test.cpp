@@ -101,7 +101,7 @@ TEST(Samples, PanelsAreWhatTheDrafterWrites) {
 }
 
 // Example 4.4 with projection, the limit carrying almost all of the load: eq. 37, raw and smoothed. The paper's variant
-// leaves a rest of strain to its regularisation, which the raw values show.
+// leaves some strain to its regularisation, which the raw values show.
 TEST(Samples, PatchTestUnderAStrainLimitCarriesOneNewtonPerMetre) {
   struct Case {
     std::vector<std::string> settings;

@@ -28,7 +28,7 @@ namespace {
 using nlohmann::json;
 using test::Folder;
 
-// `drape SCENE --set KEY=VALUE ... -o DIR ...`: value = 3 + dt^2; what else it does is told by panel.0.name.
+// `drape SCENE --set KEY=VALUE ... -o DIR ...`: value = 3 + dt^2; panel.0.name says what else it does.
 constexpr const char* fake_program = R"(#!/bin/sh
 dir= dt=0.5 mode= size=4,5
 while [ $# -gt 0 ]; do
