@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "analysis/fabric/stiffening.h"
@@ -10,11 +11,15 @@
 
 namespace toile {
 
+class BlockMatrix;
+class BlockPattern;
 class Workers;
 
 enum class TangentKind {
   exact,  // the second derivative of the energy
   upper,  // without the part of the membrane's geometric stiffness that compression makes negative
+  // Positive semidefinite: `upper`, and of bending what the slope of its law gives (Gauss-Newton). Hessians only.
+  positive,
 };
 
 // What the potentials of a system store in a state.
@@ -37,6 +42,14 @@ class Potential {
   // Adds the change of its force for a change dq at q. Allocates nothing.
   virtual void add_force_change(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
                                 Eigen::Ref<Eigen::VectorXd> df, TangentKind kind, Workers* workers) const = 0;
+
+  // The Hessian, assembled. Points that act on each other, group by group: what a BlockPattern must hold.
+  virtual std::vector<std::vector<int>> couplings() const = 0;
+  // Where this potential's blocks go in a pattern that holds its couplings; made once for each pattern.
+  virtual std::vector<int> slots(const BlockPattern& pattern) const = 0;
+  // Adds d2E/dq2 at q.
+  virtual void add_hessian(const Eigen::Ref<const Eigen::VectorXd>& q, TangentKind kind, std::span<const int> slots,
+                           BlockMatrix& matrix, Workers* workers) const = 0;
 };
 
 // Force of all of them at q [N], overwriting `force`, and what they store.

@@ -195,4 +195,36 @@ double add_kink_tangent(const KinkStrip& strip, const PointLaw& law, const doubl
   return strip.length * (dot(dx.a, dg.a) + dot(dx.before, dg.before) + dot(dx.after, dg.after));
 }
 
+KinkHessian kink_hessian(const KinkStrip& strip, const PointLaw& law, const double* q, TangentKind kind) {
+  const Hinge<double> x = interpolate(strip, q), g = angle_gradient(x);
+  const BendingTerms<double> terms = response(strip, law, angle(x));
+  Eigen::Matrix<double, 9, 1> gradient;
+  gradient << g.a.x, g.a.y, g.a.z, g.before.x, g.before.y, g.before.z, g.after.x, g.after.y, g.after.z;
+  KinkHessian hessian = strip.length * terms.slope * gradient * gradient.transpose();
+  if (kind == TangentKind::positive) return hessian;
+  for (int k = 0; k < 9; ++k) {
+    std::array<Dual, 9> along{
+        {{x.a.x}, {x.a.y}, {x.a.z}, {x.before.x}, {x.before.y}, {x.before.z}, {x.after.x}, {x.after.y}, {x.after.z}}};
+    along[static_cast<std::size_t>(k)].slope = 1;
+    const Hinge<Dual> turned = angle_gradient<Dual>(
+        {{along[0], along[1], along[2]}, {along[3], along[4], along[5]}, {along[6], along[7], along[8]}});
+    int row = 0;
+    for (const Vec3<Dual>* part : {&turned.a, &turned.before, &turned.after})
+      for (const Dual* number : {&part->x, &part->y, &part->z})
+        hessian(row++, k) += strip.length * terms.moment * number->slope;
+  }
+  return hessian;
+}
+
+Eigen::Matrix3d kink_block(const KinkStrip& strip, const KinkHessian& hessian, std::size_t i, std::size_t j) {
+  const std::array<double, 3> of_i{strip.along[i], strip.before[i], strip.after[i]},
+      of_j{strip.along[j], strip.before[j], strip.after[j]};
+  Eigen::Matrix3d block = Eigen::Matrix3d::Zero();
+  for (int r = 0; r < 3; ++r)
+    for (int s = 0; s < 3; ++s)
+      block +=
+          of_i[static_cast<std::size_t>(r)] * of_j[static_cast<std::size_t>(s)] * hessian.block<3, 3>(3 * r, 3 * s);
+  return block;
+}
+
 }  // namespace toile

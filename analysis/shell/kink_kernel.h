@@ -12,6 +12,8 @@
 //   n-, n+   unit normals w x a / |w x a|;  theta = angle from n- to n+ about a
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "analysis/model/cloth_panel.h"
@@ -41,5 +43,12 @@ double add_kink_force(const KinkStrip& strip, const PointLaw& law, const double*
 // Subtracts K dq from `minus_df` unless it is null; returns dq . K dq.
 double add_kink_tangent(const KinkStrip& strip, const PointLaw& law, const double* q, const double* dq,
                         double* minus_df);
+
+// Second derivative of the strip's energy with respect to a, w-, w+, nine numbers; TangentKind::positive: what the
+// slope of the law gives, without the turning of the angle's gradient.
+using KinkHessian = Eigen::Matrix<double, 9, 9>;
+KinkHessian kink_hessian(const KinkStrip& strip, const PointLaw& law, const double* q, TangentKind kind);
+// Its block of the strip's i-th and j-th control points.
+Eigen::Matrix3d kink_block(const KinkStrip& strip, const KinkHessian& hessian, std::size_t i, std::size_t j);
 
 }  // namespace toile

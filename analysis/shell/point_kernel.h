@@ -226,4 +226,34 @@ inline PointEnergy<Real> energy_hessian(const PointLaw& law, TangentKind kind, c
   return work;
 }
 
+// TangentKind::positive: the membrane's stress as far as it is positive, of bending and guard what the slopes of their
+// laws give. dg . dx >= 0 for every dx.
+template <class Real>
+inline void positive_hessian(const PointLaw& law, const PointJet<Real>& x, const Curvature<Real>& rest,
+                             const PointJet<Real>& dx, PointJet<Real>& dg) {
+  PointLaw membrane = law;
+  membrane.weft_warp_bending = false;
+  membrane.twist = 0;
+  energy_hessian(membrane, TangentKind::upper, x, rest, dx, dg);
+  if (!law.bends()) return;
+  const SurfaceNormal<Real> n = surface_normal(x);
+  const Vec3<Real> dn = cross(dx.x1, x.x2) + cross(x.x1, dx.x2);
+  const Real dj = dot(n.a3, dn);
+  const Vec3<Real> da3 = n.inverse_j * (dn - dj * n.a3);
+  Vec3<Real> dM{};
+  const auto add = [&](Real slope, const Vec3<Real>& x_ab, const Vec3<Real>& dx_ab, Vec3<Real>& dg_ab) {
+    const Real dm = slope * (dot(n.a3, dx_ab) + dot(da3, x_ab));
+    dM = dM + dm * x_ab;
+    dg_ab = dm * n.a3;
+  };
+  if (law.weft_warp_bending) {
+    add(evaluate<Real>(law.bending, dot(n.a3, x.x11) - rest.k11).slope, x.x11, dx.x11, dg.x11);
+    add(evaluate<Real>(law.bending, dot(n.a3, x.x22) - rest.k22).slope, x.x22, dx.x22, dg.x22);
+  }
+  if (law.twists()) add(broadcast<Real>(2.0 * law.twist), x.x12, dx.x12, dg.x12);
+  const Vec3<Real> dt = n.inverse_j * (dM - dot(dM, n.a3) * n.a3) + (guard(law, n).curvature * dj) * n.a3;
+  dg.x1 = dg.x1 + cross(x.x2, dt);
+  dg.x2 = dg.x2 + cross(dt, x.x1);
+}
+
 }  // namespace toile

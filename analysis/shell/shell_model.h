@@ -49,6 +49,11 @@ class ShellModel final : public Model, public Potential {
   void add_force_change(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& dq,
                         Eigen::Ref<Eigen::VectorXd> df, TangentKind kind, Workers* workers) const override;
 
+  std::vector<std::vector<int>> couplings() const override;
+  std::vector<int> slots(const BlockPattern& pattern) const override;
+  void add_hessian(const Eigen::Ref<const Eigen::VectorXd>& q, TangentKind kind, std::span<const int> slots,
+                   BlockMatrix& matrix, Workers* workers) const override;
+
   // The same alone: overwrites `force` with the internal force [N] at q; df = K(q) dq.
   ShellEnergy internal_force(const Eigen::Ref<const Eigen::VectorXd>& q, Eigen::Ref<Eigen::VectorXd> force,
                              Workers* workers = nullptr) const;

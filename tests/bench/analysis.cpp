@@ -13,6 +13,7 @@
 
 #include "analysis/constraint/composed_rows.h"
 #include "analysis/flat_cloth.h"
+#include "analysis/linear/block_matrix.h"
 #include "analysis/linear/cholesky.h"
 #include "analysis/projection/lagrange_newton.h"
 #include "analysis/shell/shell_model.h"
@@ -48,6 +49,23 @@ void shell_force(benchmark::State& state) {
   bench.count(state);
 }
 BENCHMARK(shell_force)->ArgNames({"p", "n"})->ArgsProduct({{2, 3}, {10, 32, 100, 316}})->Unit(benchmark::kMicrosecond);
+
+// Per element, for implicit steps.
+void shell_hessian(benchmark::State& state) {
+  ShellBench bench(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  const BlockPattern pattern(bench.model.point_count(), bench.model.couplings());
+  const std::vector<int> slots = bench.model.slots(pattern);
+  BlockMatrix matrix(pattern);
+  for (auto _ : state) {
+    matrix.set_zero();
+    bench.model.add_hessian(bench.q, TangentKind::positive, slots, matrix, nullptr);
+    benchmark::DoNotOptimize(matrix.block(0));
+  }
+  const double spans = static_cast<double>(state.range(1) - state.range(0));
+  state.counters["per_element"] = benchmark::Counter(
+      spans * spans, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(shell_hessian)->ArgNames({"p", "n"})->ArgsProduct({{2, 3}, {32, 100}})->Unit(benchmark::kMicrosecond);
 
 void shell_force_with_twist(benchmark::State& state) {
   ShellBench bench(static_cast<int>(state.range(0)), 32, 1e-3);
