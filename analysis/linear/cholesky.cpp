@@ -231,16 +231,7 @@ class Analysis {
     common_.method[0].ordering = CHOLMOD_METIS;
     common_.postorder = 1;
 
-    cholmod_sparse matrix = {};
-    matrix.nrow = matrix.ncol = static_cast<std::size_t>(pattern.size());
-    matrix.nzmax = pattern.row.size();
-    matrix.p = pattern.column_start.data();
-    matrix.i = pattern.row.data();
-    matrix.stype = -1;
-    matrix.itype = CHOLMOD_INT;
-    matrix.xtype = CHOLMOD_PATTERN;
-    matrix.dtype = CHOLMOD_DOUBLE;
-    matrix.sorted = matrix.packed = 1;
+    cholmod_sparse matrix = view(pattern);
     factor_ = cholmod_analyze(&matrix, &common_);
     if (!factor_) {
       cholmod_finish(&common_);
@@ -264,9 +255,59 @@ class Analysis {
   // Entries of each column of the factor.
   std::span<const int> counts() const { return {static_cast<const int*>(factor_->ColCount), factor_->n}; }
 
- private:
+ protected:
+  static cholmod_sparse view(SparsePattern& pattern) {
+    cholmod_sparse matrix = {};
+    matrix.nrow = matrix.ncol = static_cast<std::size_t>(pattern.size());
+    matrix.nzmax = pattern.row.size();
+    matrix.p = pattern.column_start.data();
+    matrix.i = pattern.row.data();
+    matrix.stype = -1;
+    matrix.itype = CHOLMOD_INT;
+    matrix.xtype = CHOLMOD_PATTERN;
+    matrix.dtype = CHOLMOD_DOUBLE;
+    matrix.sorted = matrix.packed = 1;
+    return matrix;
+  }
+
   cholmod_common common_ = {};
   cholmod_factor* factor_ = nullptr;
+};
+
+// Its numbers too.
+class CholmodFactor : public Analysis {
+ public:
+  explicit CholmodFactor(SparsePattern pattern) : Analysis(pattern), pattern_(std::move(pattern)) {
+    common_.quick_return_if_not_posdef = 1;
+  }
+
+  bool factorise(std::span<const double> values) {
+    values_.assign(values.begin(), values.end());
+    cholmod_sparse matrix = view(pattern_);
+    matrix.xtype = CHOLMOD_REAL;
+    matrix.x = values_.data();
+    return cholmod_factorize(&matrix, factor_, &common_) != 0 && common_.status == CHOLMOD_OK &&
+           factor_->minor == factor_->n;
+  }
+
+  void solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) {
+    work_ = rhs;
+    cholmod_dense b = {};
+    b.nrow = b.nzmax = b.d = static_cast<std::size_t>(work_.size());
+    b.ncol = 1;
+    b.x = work_.data();
+    b.xtype = CHOLMOD_REAL;
+    b.dtype = CHOLMOD_DOUBLE;
+    cholmod_dense* solution = cholmod_solve(CHOLMOD_A, factor_, &b, &common_);
+    if (!solution) throw SolverError("sparse factorisation: CHOLMOD could not solve (out of memory?)");
+    x = Eigen::Map<const Eigen::VectorXd>(static_cast<const double*>(solution->x), x.size());
+    cholmod_free_dense(&solution, &common_);
+  }
+
+ private:
+  SparsePattern pattern_;
+  std::vector<double> values_;
+  Eigen::VectorXd work_;
 };
 
 }  // namespace
@@ -274,24 +315,41 @@ class Analysis {
 struct Cholesky::Impl {
   std::unique_ptr<Envelope> envelope;
   std::unique_ptr<SupernodalFactor> supernodal;
+  std::unique_ptr<CholmodFactor> cholmod;
   Workers* workers = nullptr;
   std::size_t values = 0, nonzeros = 0;
   double operations = 0;
 };
 
-Cholesky::Cholesky(SparsePattern pattern) : impl_(std::make_unique<Impl>()) {
+CholeskyNumbers default_numbers() {
+#ifdef TOILE_CHOLMOD_SOLVES
+  return CholeskyNumbers::cholmod;
+#else
+  return CholeskyNumbers::ours;
+#endif
+}
+
+Cholesky::Cholesky(SparsePattern pattern, CholeskyNumbers numbers) : impl_(std::make_unique<Impl>()) {
   impl_->values = pattern.row.size();
-  if (EnvelopeShape shape(pattern); shape.mean_square_length() <= longest_rows) {
+  if (EnvelopeShape shape(pattern); numbers == CholeskyNumbers::ours && shape.mean_square_length() <= longest_rows) {
     impl_->envelope = std::make_unique<Envelope>(pattern, std::move(shape));
     impl_->nonzeros = impl_->envelope->nonzeros();
     impl_->operations = impl_->envelope->operations();
     return;
   }
-  const Analysis analysis(pattern);
-  for (const int count : analysis.counts()) {
-    impl_->nonzeros += static_cast<std::size_t>(count);
-    impl_->operations += static_cast<double>(count) * count;
+  const auto count_up = [&](const Analysis& analysis) {
+    for (const int count : analysis.counts()) {
+      impl_->nonzeros += static_cast<std::size_t>(count);
+      impl_->operations += static_cast<double>(count) * count;
+    }
+  };
+  if (numbers == CholeskyNumbers::cholmod) {
+    impl_->cholmod = std::make_unique<CholmodFactor>(std::move(pattern));
+    count_up(*impl_->cholmod);
+    return;
   }
+  const Analysis analysis(pattern);
+  count_up(analysis);
   impl_->supernodal = std::make_unique<SupernodalFactor>(analysis.shape(), pattern.column_start, pattern.row);
 }
 Cholesky::~Cholesky() = default;
@@ -300,10 +358,12 @@ Cholesky& Cholesky::operator=(Cholesky&&) noexcept = default;
 
 bool Cholesky::factorise(std::span<const double> values) {
   assert(values.size() == impl_->values);
+  if (impl_->cholmod) return impl_->cholmod->factorise(values);
   return impl_->envelope ? impl_->envelope->factorise(values) : impl_->supernodal->factorise(values, impl_->workers);
 }
 
 void Cholesky::solve(const Eigen::Ref<const Eigen::VectorXd>& rhs, Eigen::Ref<Eigen::VectorXd> x) {
+  if (impl_->cholmod) return impl_->cholmod->solve(rhs, x);
   impl_->envelope ? impl_->envelope->solve(rhs, x) : impl_->supernodal->solve(rhs, x, impl_->workers);
 }
 

@@ -48,6 +48,17 @@ double solve_error(Cholesky& factor, const System& s) {
   return (x - expected).cwiseAbs().maxCoeff();
 }
 
+// What the diagonal of row c may at least be: a^T A^-1 a of the rest.
+double singular_diagonal(const Eigen::MatrixXd& matrix, int c) {
+  Eigen::MatrixXd rest = matrix;
+  Eigen::VectorXd row = matrix.col(c);
+  row[c] = 0;
+  rest.row(c).setZero();
+  rest.col(c).setZero();
+  rest(c, c) = 1;
+  return row.dot(rest.ldlt().solve(row));
+}
+
 // Both kinds of factor: small systems take the envelope, larger ones supernodes.
 class CholeskyOfSize : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Sizes, CholeskyOfSize, ::testing::Values(4, 60, 300, 1100));
@@ -152,6 +163,38 @@ TEST(Cholesky, SolvesAGridByOneThreadAndThree) {
   ASSERT_TRUE(factor.factorise(values));
   factor.solve(rhs, three);
   EXPECT_EQ(one, three);
+}
+
+// Two factors that share nothing but the ordering: near-singular matrices too, where both lose the same digits.
+TEST_P(CholeskyOfSize, AgreesWithCholmod) {
+  for (const double smallest : {1.0, 1e-6, 1e-10}) {
+    System s = random_system(GetParam(), 3, 18);
+    // One pivot is `smallest`: the diagonal comes first in its column.
+    const int n = GetParam(), c = n / 2;
+    s.values[static_cast<std::size_t>(s.pattern.column_start[c])] = s.dense(c, c) =
+        singular_diagonal(s.dense, c) + smallest;
+    Cholesky ours(s.pattern, CholeskyNumbers::ours), oracle(s.pattern, CholeskyNumbers::cholmod);
+    ASSERT_TRUE(ours.factorise(s.values));
+    ASSERT_TRUE(oracle.factorise(s.values));
+    const Eigen::VectorXd rhs = Eigen::VectorXd::LinSpaced(n, 1, 2);
+    Eigen::VectorXd a(n), b(n);
+    ours.solve(rhs, a);
+    oracle.solve(rhs, b);
+    EXPECT_LT((a - b).norm(), 1e-13 / std::min(1.0, smallest) * a.norm()) << smallest;
+    EXPECT_LT((s.dense * a - rhs).norm(), 1e-11 * (s.dense.norm() * a.norm() + rhs.norm())) << smallest;
+  }
+}
+
+TEST_P(CholeskyOfSize, BothSayWhereAMatrixIsIndefinite) {
+  const System s = random_system(GetParam(), 3, 19);
+  for (const CholeskyNumbers numbers : {CholeskyNumbers::ours, CholeskyNumbers::cholmod}) {
+    Cholesky factor(s.pattern, numbers);
+    std::vector<double> bad = s.values;
+    bad[static_cast<std::size_t>(s.pattern.column_start[GetParam() / 3])] *= -1;
+    EXPECT_FALSE(factor.factorise(bad));
+    ASSERT_TRUE(factor.factorise(s.values));
+    EXPECT_LT(solve_error(factor, s), 1e-12);
+  }
 }
 
 }  // namespace
