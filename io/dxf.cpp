@@ -210,9 +210,9 @@ void DxfReader::choose_corners(const std::vector<Piece>& pieces) {
         if (meant_layer(piece, item) == "1" && is_curve(item)) out.push_back(dxf::curves_of(item, rule).size());
       return out;
     };
-    const auto agree = [&] {
-      const auto first = counts(*same[0]);
-      return std::ranges::all_of(same, [&](const Piece* piece) { return counts(*piece) == first; });
+    const auto agree = [&, &alike = same] {
+      const auto first = counts(*alike[0]);
+      return std::ranges::all_of(alike, [&](const Piece* piece) { return counts(*piece) == first; });
     };
     if (agree()) continue;
     bool found = false;

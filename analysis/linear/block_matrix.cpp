@@ -19,8 +19,7 @@ BlockPattern::BlockPattern(int points, const std::vector<std::vector<int>>& grou
   column_start_.push_back(0);
   for (std::vector<int>& column : columns) {
     std::ranges::sort(column);
-    const auto repeated = std::ranges::unique(column);
-    row_.insert(row_.end(), column.begin(), repeated.begin());
+    row_.insert(row_.end(), column.begin(), std::unique(column.begin(), column.end()));
     column_start_.push_back(static_cast<int>(row_.size()));
     column = {};
   }

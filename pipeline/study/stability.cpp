@@ -101,9 +101,9 @@ std::string over_limit(const Json& report) {
   }
   const double tolerance = number(report, "/strain/limit/tolerance").value_or(0);
   for (const auto& [d, thread] : {std::pair(0, "weft"), std::pair(1, "warp")}) {
-    const auto end = [&](const char* sign, const char* extreme, double unlimited) {
-      const double allowed = number(report, fmt::format("/strain/limit/{}/{}", sign, d)).value_or(unlimited);
-      const double reached = number(report, fmt::format("/strain/at_constraints/{}_{}", extreme, thread)).value_or(NAN);
+    const auto end = [&, at = d, name = thread](const char* sign, const char* extreme, double unlimited) {
+      const double allowed = number(report, fmt::format("/strain/limit/{}/{}", sign, at)).value_or(unlimited);
+      const double reached = number(report, fmt::format("/strain/at_constraints/{}_{}", extreme, name)).value_or(NAN);
       return std::pair(reached, allowed);
     };
     const auto [most, stretch] = end("stretch", "max", INFINITY);
