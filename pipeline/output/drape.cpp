@@ -103,6 +103,116 @@ bool holds(const std::filesystem::path& directory, const std::filesystem::path& 
 
 }  // namespace
 
+namespace {
+
+// What a drape writes into its folder while it runs, and at its end.
+class Folder {
+ public:
+  // Nothing is written before this; `from`: the state that a resumed run goes on from.
+  Folder(const Build& built, std::filesystem::path directory, const DrapeOptions& options, const RunState& from,
+         Clock::time_point called)
+      : built_(built), directory_(std::move(directory)), called_(called), start_time_(from.state.t) {
+    const bool goes_on = options.resume && holds(directory_, *options.resume);
+    if (!goes_on) prepare_directory(directory_, options.overwrite);
+    log_.open(directory_ / "run.log", goes_on ? std::ios::app : std::ios::trunc);
+    begin_log(options);
+    writer_.emplace(built, directory_, from.frame_times);
+    const std::filesystem::path former =
+        options.resume ? std::filesystem::absolute(*options.resume).parent_path() / "history.csv" : "";
+    history_.emplace(built, directory_ / "history.csv", former, from);
+    start_ = saved_ = Clock::now();
+  }
+
+  void frame(const RunFrame& frame) {
+    writer_->write(frame);
+    log_ << fmt::format("frame {:4}  t = {:.6f} s  {:.2f} s of wall time\n", frame.number, frame.time, since(start_))
+         << std::flush;
+  }
+  void resumable(const RunResult& now) {
+    history_->add(now);
+    if (now.steps == 0 || since(saved_) >= checkpoint_seconds) save(now, *now.system);
+  }
+  void save(const RunState& state, const System& system) {
+    write_file(directory_ / "checkpoint", format_checkpoint(mark_, state, system));
+    saved_ = Clock::now();
+  }
+  std::string progress(const RunProgress& p) const {
+    if (built_.scene.rest) return fmt::format("until rest: t = {:.3f} s  step {} of {:.2g} s", p.time, p.steps, p.dt);
+    const double gone = p.time - start_time_;
+    return fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {} left", 100 * p.time / p.until,
+                       p.time, p.until, p.steps, p.dt, duration(since(start_) * (p.until - p.time) / gone));
+  }
+
+  // Checkpoint, draped.igs and preview of the last state.
+  void write_end(RunResult& result) {
+    save(result.accepted ? *result.accepted : result, *result.system);
+    writing_ = Clock::now();
+    const Eigen::VectorXd q = control_points(*result.system, result.state);
+    write_file(directory_ / "draped.igs", draped_file(built_, q).text);
+    if (!built_.scene.preview) return;
+    // A picture is a courtesy: its failure doesn't spoil the run.
+    try {
+      const std::string png = writer_->preview(*result.system, q);
+      if (!png.empty()) write_file(directory_ / "preview.png", png);
+    } catch (const Error& error) {
+      result.warnings.push_back(fmt::format("preview.png was not drawn: {}", error.what()));
+    }
+  }
+  // Returns the text of report.json.
+  std::string write_report(const RunResult& result, const StateMeasures& measures) {
+    const std::string report = json_text(report_json(built_, result, measures, since(writing_))) + "\n";
+    write_file(directory_ / "report.json", report);
+    log_ << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time, files included\n",
+                        name(result.exit), result.steps, result.redone_steps, result.dt_min, result.dt_max,
+                        since(called_));
+    if (!result.reason.empty()) log_ << result.reason << "\n";
+    if (!log_.flush()) throw OutputError((directory_ / "run.log").string() + ": not everything could be written");
+    return report;
+  }
+
+ private:
+  void begin_log(const DrapeOptions& options) {
+    log_ << "toile " << version() << "\nscene " << built_.scene.path.string() << "\n";
+    if (options.resume) log_ << fmt::format("resumed from {} at t = {:.6f} s\n", options.resume->string(), start_time_);
+    for (std::size_t k = 0; k < built_.panels.size(); ++k) log_ << describe(built_, k) << "\n";
+    const bool twist_free =
+        std::ranges::all_of(built_.scene.panels, [](const ScenePanel& p) { return p.fabric.bending.twist == 0; });
+    if (twist_free) log_ << "twist stiffness is 0, as in the paper's bending law\n";
+    for (const std::string& warning : built_.warnings) log_ << "warning: " << warning << "\n";
+    for (const std::string& note : built_.notes) log_ << note << "\n";
+  }
+
+  const Build& built_;
+  const std::filesystem::path directory_;
+  const Clock::time_point called_;
+  const double start_time_;
+  const SceneMark mark_ = scene_mark(built_);
+  std::ofstream log_;
+  std::optional<FrameWriter> writer_;
+  std::optional<History> history_;
+  Clock::time_point start_, saved_, writing_;
+};
+
+void tell(const Build& built, Console& console) {
+  for (const std::string& warning : built.warnings) console.warning(warning);
+  for (const std::string& note : built.notes) console.detail(note);
+  for (const std::string& note : built.scene.notes) console.note(note);
+  for (std::size_t k = 0; k < built.panels.size(); ++k) console.detail(describe(built, k));
+}
+
+// What the end of a run shows that its steps could not.
+void warn_of_end(const Build& built, RunResult& result, const StateMeasures& measures) {
+  if (result.unconverged_steps > 0) {
+    result.warnings.push_back(
+        fmt::format("{} of {} steps did not meet the strain limit or the pins within {} iterations",
+                    result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
+  }
+  if (const std::string between = strained_between_points(built, measures); !between.empty())
+    result.warnings.push_back(between);
+}
+
+}  // namespace
+
 int drape(Scene scene, const DrapeOptions& options, Console& console) {
   const Clock::time_point called = Clock::now();
   refuse_not_simulated(scene);
@@ -110,112 +220,39 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
   const Build built = build(std::move(scene));
   std::optional<Workers> threads;
   if (options.threads > 1) threads.emplace(options.threads);
-  Workers* const workers = threads ? &*threads : nullptr;
-  for (const std::string& warning : built.warnings) console.warning(warning);
-  for (const std::string& note : built.notes) console.detail(note);
-  for (const std::string& note : built.scene.notes) console.note(note);
-  for (std::size_t k = 0; k < built.panels.size(); ++k) console.detail(describe(built, k));
+  RunHooks hooks;
+  hooks.workers = threads ? &*threads : nullptr;
+  tell(built, console);
   // What can be refused is refused before anything is written.
   RunResult result;
-  std::unique_ptr<System> start_system;
+  std::unique_ptr<System> start;
   if (options.resume) {
-    result = read_checkpoint(*options.resume, built, workers);
+    result = read_checkpoint(*options.resume, built, hooks.workers);
     require_time_left(built, result);
   } else {
-    start_system = assemble(built, 0, workers);
+    start = assemble(built, 0, hooks.workers);
   }
-  const bool goes_on = options.resume && holds(directory, *options.resume);
-  if (!goes_on) prepare_directory(directory, options.overwrite);
 
-  std::ofstream log(directory / "run.log", goes_on ? std::ios::app : std::ios::trunc);
-  log << "toile " << version() << "\nscene " << built.scene.path.string() << "\n";
-  if (options.resume) log << fmt::format("resumed from {} at t = {:.6f} s\n", options.resume->string(), result.state.t);
-  for (std::size_t k = 0; k < built.panels.size(); ++k) log << describe(built, k) << "\n";
-  const bool twist_free =
-      std::ranges::all_of(built.scene.panels, [](const ScenePanel& p) { return p.fabric.bending.twist == 0; });
-  if (twist_free) log << "twist stiffness is 0, as in the paper's bending law\n";
-  for (const std::string& warning : built.warnings) log << "warning: " << warning << "\n";
-  for (const std::string& note : built.notes) log << note << "\n";
-
-  FrameWriter writer(built, directory, result.frame_times);
-  const std::filesystem::path former =
-      options.resume ? std::filesystem::absolute(*options.resume).parent_path() / "history.csv" : "";
-  History history(built, directory / "history.csv", former, result);
-  const SceneMark mark = scene_mark(built);
-  const Clock::time_point start = Clock::now();
-  Clock::time_point saved = start;
-  const double start_time = result.state.t;
-  const auto save = [&](const RunState& state, const System& system) {
-    write_file(directory / "checkpoint", format_checkpoint(mark, state, system));
-    saved = Clock::now();
-  };
+  Folder folder(built, directory, options, result, called);
   const InterruptGuard guard;
-  RunHooks hooks;
-  hooks.workers = workers;
   hooks.stop = [&] {
     if (guard.asked()) return RunExit::interrupted;
     const auto& limit = built.scene.time_limit;
     return limit && since(called) >= *limit ? RunExit::time_limit : RunExit::ok;
   };
-  hooks.resumable = [&](const RunResult& now) {
-    history.add(now);
-    if (now.steps == 0 || since(saved) >= checkpoint_seconds) save(now, *now.system);
-  };
-  hooks.frame = [&](const RunFrame& frame) {
-    writer.write(frame);
-    log << fmt::format("frame {:4}  t = {:.6f} s  {:.2f} s of wall time\n", frame.number, frame.time, since(start))
-        << std::flush;
-  };
-  hooks.progress = [&](const RunProgress& p) {
-    if (built.scene.rest) {
-      console.live(fmt::format("until rest: t = {:.3f} s  step {} of {:.2g} s", p.time, p.steps, p.dt));
-      return;
-    }
-    const double gone = p.time - start_time;
-    console.live(fmt::format("{:3.0f} %  t = {:.3f} of {:.3g} s  step {} of {:.2g} s  {} left", 100 * p.time / p.until,
-                             p.time, p.until, p.steps, p.dt, duration(since(start) * (p.until - p.time) / gone)));
-  };
-  result = result.system ? run(built, std::move(result), hooks) : run(built, std::move(start_system), hooks);
+  hooks.resumable = [&](const RunResult& now) { folder.resumable(now); };
+  hooks.frame = [&](const RunFrame& frame) { folder.frame(frame); };
+  hooks.progress = [&](const RunProgress& progress) { console.live(folder.progress(progress)); };
+  result = result.system ? run(built, std::move(result), hooks) : run(built, std::move(start), hooks);
   console.end_live();
-  for (const std::string& warning : result.warnings) console.warning(warning);
-  if (result.accepted) {
-    save(*result.accepted, *result.system);
-  } else {
-    save(result, *result.system);
-  }
 
-  const Clock::time_point writing = Clock::now();
-  const Eigen::VectorXd q = control_points(*result.system, result.state);
-  write_file(directory / "draped.igs", draped_file(built, q).text);
-  if (built.scene.preview) {
-    // A picture is a courtesy: its failure doesn't spoil the run.
-    try {
-      const std::string png = writer.preview(*result.system, q);
-      if (!png.empty()) write_file(directory / "preview.png", png);
-    } catch (const Error& error) {
-      result.warnings.push_back(fmt::format("preview.png was not drawn: {}", error.what()));
-      console.warning(result.warnings.back());
-    }
-  }
-  if (result.unconverged_steps > 0) {
-    result.warnings.push_back(
-        fmt::format("{} of {} steps did not meet the strain limit or the pins within {} iterations",
-                    result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
-    console.warning(result.warnings.back());
-  }
+  folder.write_end(result);
   // The forces of a refused step are not those of the state that it started from.
   const double forces_of = result.exit == RunExit::solver_failed ? 0 : result.dt_last;
   const StateMeasures measures = measure(built, *result.system, result.state, forces_of);
-  if (const std::string between = strained_between_points(built, measures); !between.empty()) {
-    result.warnings.push_back(between);
-    console.warning(between);
-  }
-  const std::string report = json_text(report_json(built, result, measures, since(writing))) + "\n";
-  write_file(directory / "report.json", report);
-  log << fmt::format("{}: {} steps, {} redone, dt {:.3g} to {:.3g} s, {:.3f} s of wall time, files included\n",
-                     name(result.exit), result.steps, result.redone_steps, result.dt_min, result.dt_max, since(called));
-  if (!result.reason.empty()) log << result.reason << "\n";
-  if (!log.flush()) throw OutputError((directory / "run.log").string() + ": not everything could be written");
+  warn_of_end(built, result, measures);
+  for (const std::string& warning : result.warnings) console.warning(warning);
+  const std::string report = folder.write_report(result, measures);
 
   for (const std::string& line : summary(built, result, measures, since(called))) console.note(line);
   console.note(fmt::format("wrote {}; open", directory.string()));
