@@ -62,8 +62,8 @@ void shell_hessian(benchmark::State& state) {
     benchmark::DoNotOptimize(matrix.block(0));
   }
   const double spans = static_cast<double>(state.range(1) - state.range(0));
-  state.counters["per_element"] = benchmark::Counter(
-      spans * spans, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+  state.counters["per_element"] =
+      benchmark::Counter(spans * spans, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(shell_hessian)->ArgNames({"p", "n"})->ArgsProduct({{2, 3}, {32, 100}})->Unit(benchmark::kMicrosecond);
 
