@@ -463,6 +463,15 @@ ExactLoop square_around(const Vector2d& c, double h) {
   return loop;
 }
 
+// Whether no place on a loop, of a thousand a piece, lies in a square.
+bool keeps_clear(const ExactLoop& loop, const Vector2d& centre, double half) {
+  constexpr int places = 1024;
+  for (const ExactPiece& p : loop)
+    for (int k = 0; k < places; ++k)
+      if ((point_at(p, k / static_cast<double>(places)) - centre).cwiseAbs().maxCoeff() <= half) return false;
+  return true;
+}
+
 // Holes that cross the outline or another hole; and, to be refused, holes outside and holes in holes.
 TrimCase invalid(Random& random) {
   TrimCase out{"invalid", {}, {}, {}};
@@ -489,8 +498,11 @@ TrimCase invalid(Random& random) {
       out.loops = {star_in_box(random, 0, 0, 2), reversed(star_in_box(random, 2, random.between(0, 2), 2))};
       break;
     default: {
+      const double size = 0.015625;
+      const Vector2d corner(2.015625, 1.9765625);
       ExactLoop hole = star_in_box(random, 1, 1, 2);
-      out.loops = {border(random, 4), reversed(hole), reversed(star_in_box(random, 2.015625, 1.9765625, 0.015625))};
+      while (!keeps_clear(hole, corner + Vector2d::Constant(size / 2), size)) hole = star_in_box(random, 1, 1, 2);
+      out.loops = {border(random, 4), reversed(hole), reversed(star_in_box(random, corner.x(), corner.y(), size))};
     }
   }
   return out;
