@@ -38,6 +38,7 @@ BoundaryCurves curve_on_surface(Reading& reading, const Entry& e, int surface) {
     in.fail("it has neither a parameter curve nor a model curve");
   BoundaryCurves out;
   out.place = reading.file.place(e);
+  out.parameter_preferred = boundary.preference == 1;
   std::string lost;
   if (boundary.model_curve != 0) {
     try {
@@ -73,6 +74,7 @@ BoundaryCurves boundary_list(Reading& reading, const Entry& e, int surface) {
   compare_surfaces(reading, e, boundary.surface, surface);
   BoundaryCurves out;
   out.place = reading.file.place(e);
+  out.parameter_preferred = boundary.preference == 2;
   const Eigen::Affine3d t = reading.transform(e);
   bool every_edge = true;
   for (const BoundaryUse& use : boundary.curves) {

@@ -15,9 +15,10 @@ namespace toile::iges {
 // The curves of one boundary as the file gives them, the model curves placed where the surface stands.
 struct BoundaryCurves {
   std::vector<Curve3> model;
-  std::vector<Curve3> parameter;  // the file's parameters in x and y; empty where any edge has none
-  std::string place;              // "panel.igs:412: entity 142: "
-  std::size_t record = 0;         // which of the face's boundary records it comes from
+  std::vector<Curve3> parameter;     // the file's parameters in x and y; empty where any edge has none
+  bool parameter_preferred = false;  // the record says so
+  std::string place;                 // "panel.igs:412: entity 142: "
+  std::size_t record = 0;            // which of the face's boundary records it comes from
   // What was done to it, filled in: empty where the parameter curves are the file's own numbers.
   std::string converted;
 };

@@ -141,6 +141,7 @@ std::vector<BoundaryCurves> part_chains(Reading& reading, const FileSurface& sur
     for (std::size_t k = 0; k < chains; ++k) {
       BoundaryCurves& one = out.emplace_back();
       one.place = b.place;
+      one.parameter_preferred = b.parameter_preferred;
       one.record = b.record;
       one.model = b.model.empty() ? std::vector<Curve3>{} : part(b.model, model, k);
       // Parameter curves that don't part alike are left out: the model curves stand.

@@ -19,7 +19,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double believable = 1e-2;  // of the surface's size: model curves further off it bound something else
+// Of the surface's size: model curves further off it, or parameter curves further off them, bound something else.
+constexpr double believable = 1e-2;
 constexpr double bridgeable = 1e-2;  // of the domain: wider gaps are refused
 constexpr double corner = 0.01;      // tangent of the angle by which a curve turns at once
 constexpr const char* out_of_order =
@@ -110,8 +111,14 @@ class LoopCurves {
       if (fit.excursion > usable) trouble = "its parameter curves leave the domain by " + format_real(fit.excursion);
       if (!b.model.empty()) {
         off = disagreement(plane_, b, map_);
-        if (trouble.empty() && off > agreed(plane_))
-          trouble = "its parameter curves lie " + format_real(off) + " from its model curves";
+        const std::string apart = "its parameter curves lie " + format_real(off) + " from its model curves";
+        const bool taken = b.parameter_preferred && off <= believable * plane_.size;
+        if (trouble.empty() && off > agreed(plane_)) {
+          if (taken)
+            plane_.note(b, "apart", apart + "; the boundary prefers the parameter curves, which are taken");
+          else
+            trouble = apart;
+        }
         if (b.model.size() != b.parameter.size())
           plane_.note(b, "segment counts",
                       std::to_string(b.parameter.size()) + " parameter curves and " + std::to_string(b.model.size()) +

@@ -60,6 +60,46 @@ TEST(IgesFaces, PreferencesOf141DontMatterWhereBothCurvesAgree) {
   EXPECT_TRUE(file.warnings.empty()) << file.warnings[0];
 }
 
+// The text with every `old` replaced by as many characters: parameters stand in columns.
+std::string replaced(std::string text, const std::string& old, const std::string& by) {
+  EXPECT_EQ(old.size(), by.size());
+  std::size_t count = 0;
+  for (std::size_t at = text.find(old); at != std::string::npos; at = text.find(old, at + by.size()), ++count)
+    text.replace(at, old.size(), by);
+  EXPECT_GT(count, 0u) << old;
+  return text;
+}
+
+TEST(IgesFaces, CurvesThatPartALittleAreTakenAsTheBoundaryPrefers) {
+  // Parameter curves around [20, 90] mm squared on a plane of 100 mm, model curves that start half a millimetre
+  // further.
+  const std::string apart = replaced(test::corpus_text("disagreeing_curves"), "10.0,", "20.5,");
+  const auto of = [](const std::string& text) { return parse_iges(text, "apart.igs"); };
+  const PanelFile preferred = of(apart);
+  ASSERT_EQ(preferred.panels.size(), 1u);
+  expect_near_rel(area(preferred.panels[0]), 70.0 * 70, 1e-12);
+  EXPECT_TRUE(has_warning(preferred, "0.7071067811865476 from its model curves; the boundary prefers the parameter"));
+  for (const char* preference : {"0", "2", "3"}) {
+    const PanelFile file = of(replaced(apart, "142,0,1,11,21,1;", std::string("142,0,1,11,21,") + preference + ";"));
+    expect_near_rel(area(file.panels.at(0)), 69.5 * 69.5, 1e-12);
+    EXPECT_TRUE(has_warning(file, "pulled back")) << preference;
+  }
+  // Further apart than a hundredth of the surface's size they aren't one trim, whatever is preferred.
+  const PanelFile far = of(replaced(apart, "20.5,", "22.0,"));
+  expect_near_rel(area(far.panels.at(0)), 68.0 * 68, 1e-12);
+}
+
+TEST(IgesFaces, A141CountsItsPreferencesTheOtherWay) {
+  std::string text = replaced(test::corpus_text("preferences_141"), "110,0.1,", "110,.11,");
+  text = replaced(text, ",0.0,0.1,", ",0.0,.11,");  // parameter curves a millimetre from the model curves
+  const PanelFile file = parse_iges(text, "apart_141.igs");
+  ASSERT_EQ(file.panels.size(), 4u);
+  for (std::size_t preference = 0; preference < 4; ++preference) {
+    const double u = file.panels[preference].loops[0].curves[0].curve.start().x();
+    EXPECT_NEAR(u, preference == 2 ? 0.11 : 0.1, 1e-6) << preference;
+  }
+}
+
 TEST(IgesFaces, LoopsBesideEachOtherAreAPanelEach) {
   const std::vector<double> found = areas("several_outer_loops");
   ASSERT_EQ(found.size(), 3u);  // the island in the hole is one too
