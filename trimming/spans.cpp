@@ -179,4 +179,8 @@ std::span<const TrimSpan> TrimSpans::of(int loop) const {
   return std::span(all).subspan(static_cast<std::size_t>(f.front()), static_cast<std::size_t>(f.back() - f.front()));
 }
 
+bool against_the_file(const TrimLoop& loop) {
+  return loop.curves.size() == 1 ? loop.curves.front().reversed : loop.curves.front().index > loop.curves.back().index;
+}
+
 }  // namespace toile

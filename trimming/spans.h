@@ -44,4 +44,7 @@ struct TrimSpans {
 std::vector<TrimSpan> trim_spans(const Curve2& curve, int loop = 0, int curve_position = 0);
 TrimSpans trim_spans(const std::vector<TrimLoop>& loops);
 
+// Does the loop run against the file's order of its curves (against the direction of a single one)?
+bool against_the_file(const TrimLoop& loop);
+
 }  // namespace toile

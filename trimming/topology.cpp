@@ -62,10 +62,6 @@ struct SpanEvent {
   bool crosses_u = false, crosses_v = false;
 };
 
-bool reversed_loop(const TrimLoop& loop) {
-  return loop.curves.size() > 1 && loop.curves.front().index > loop.curves.back().index;
-}
-
 class Tracer {
  public:
   explicit Tracer(const TrimmedSurface& surface) : surface_(surface) {
@@ -245,9 +241,7 @@ class Tracer {
 
   // A joint of two curves belongs to the later one in the file's order, whichever way the loop is traversed.
   void choose_curve_at_joints(int l, std::vector<Node>& nodes, const std::vector<Portion>& portions) const {
-    const TrimLoop& of = loop(l);
-    const bool backwards = of.curves.size() == 1 ? of.curves.front().reversed : reversed_loop(of);
-    if (!backwards) return;
+    if (!against_the_file(loop(l))) return;
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       const Portion& before = portions[(k + portions.size() - 1) % portions.size()];
       if (before.curve != nodes[k].curve || before.t1 != nodes[k].t) {
@@ -582,6 +576,8 @@ const char* name(PointKind kind) {
       return "tangent_v";
     case PointKind::crossing_uv:
       return "crossing_uv";
+    case PointKind::corner:
+      return "corner";
   }
   return "";
 }

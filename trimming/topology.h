@@ -21,7 +21,8 @@ struct KnotMesh {
 };
 KnotMesh knot_mesh(const NurbsSurface& surface);
 
-enum class PointKind { vertex, crossing_u, crossing_v, tangent_u, tangent_v, crossing_uv };
+// Events have kinds from crossing_u to crossing_uv; the others are of constraint points.
+enum class PointKind { vertex, crossing_u, crossing_v, tangent_u, tangent_v, crossing_uv, corner };
 const char* name(PointKind kind);  // "vertex", "crossing_u", ... as in `toile inspect`
 
 // A trim curve meets knot lines. Listed in traversal order, loop by loop.

@@ -147,7 +147,8 @@ std::vector<ConstraintPoint> apply_rule(PointRule rule, const TrimmedSurface& su
   };
   for (ConstraintPoint& point : listed) {
     const bool of_trim = point.kind != PointKind::vertex && !(vertex(point.u, point.v) && on_domain_border(point));
-    if (knot_mesh || (among(lines_u, point.u) && among(lines_v, point.v)) ||
+    const bool corner = point.kind == PointKind::corner;
+    if ((knot_mesh && !corner) || (among(lines_u, point.u) && among(lines_v, point.v)) ||
         (of_trim && rule == PointRule::greville_derivative))
       continue;
     point.used = false;

@@ -50,7 +50,7 @@ std::optional<PointRule> point_rule(std::string_view name);
 // rule's other points, u fastest: all that lie inside the material, of kind vertex, since the projection treats them
 // alike, but no part of the list that `toile inspect` shows. Meetings of trims with knot lines belong to the rules on
 // the knot mesh and to greville_derivative (not those on the border of the domain, which has lines of its own); the
-// others limit no strain at trims.
+// others limit no strain at trims. Corners of trims belong to greville_derivative alone.
 std::vector<ConstraintPoint> apply_rule(PointRule rule, const TrimmedSurface& surface, const TrimTopology& topology,
                                         std::vector<ConstraintPoint>& listed, const Closure& closure = {});
 

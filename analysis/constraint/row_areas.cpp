@@ -66,21 +66,44 @@ Eigen::VectorXd shares(const Matrix& values, const Eigen::VectorXd& cloth) {
   return out;
 }
 
-// Least squares of |A z - c|^2 + damping^2 |z|^2 by conjugate gradients from z = 0. [Bjorck 1996, 7.4]
-Eigen::VectorXd damped_least_squares(const Matrix& a, const Eigen::VectorXd& c, const RowAreaOptions& options) {
-  const double shift = options.damping * options.damping;
-  Eigen::VectorXd z = Eigen::VectorXd::Zero(a.cols()), left = c, gradient = a.transpose() * left, direction = gradient;
-  double size = gradient.squaredNorm();
-  const double enough = 1e-20 * size;
-  for (int k = 0; k < options.iterations && size > enough; ++k) {
-    const Eigen::VectorXd image = a * direction;
-    const double step = size / (image.squaredNorm() + shift * direction.squaredNorm());
-    z += step * direction;
-    left -= step * image;
-    gradient = a.transpose() * left - shift * z;
-    const double next = gradient.squaredNorm();
-    direction = gradient + next / size * direction;
-    size = next;
+// z that makes |A z - c|^2 + damping^2 |z|^2 least within the bounds of 1 + z: projected Newton steps, each by
+// conjugate gradients over the unknowns that no bound holds; downhill where such a step leads nowhere. [Bertsekas 1982;
+// Bjorck 1996, 7.4]
+Eigen::VectorXd bounded_least_squares(const Matrix& a, const Eigen::VectorXd& c, const RowAreaOptions& options) {
+  const double shift = options.damping * options.damping, least = options.least - 1, most = options.most - 1;
+  const auto energy = [&](const Eigen::VectorXd& z) { return (a * z - c).squaredNorm() + shift * z.squaredNorm(); };
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(a.cols());
+  const auto moves = [&](const Eigen::VectorXd& step) {
+    const double before = energy(z);
+    for (double part = 1; part > 1e-9; part /= 2) {
+      const Eigen::VectorXd moved = (z + part * step).cwiseMax(least).cwiseMin(most);
+      if (!(energy(moved) < before)) continue;
+      z = moved;
+      return true;
+    }
+    return false;
+  };
+  double enough = -1;
+  for (int newton = 0; newton < options.newton_steps; ++newton) {
+    Eigen::VectorXd downhill = a.transpose() * (c - a * z) - shift * z, free(z.size());
+    for (Eigen::Index r = 0; r < z.size(); ++r)
+      free[r] = (z[r] <= least && downhill[r] < 0) || (z[r] >= most && downhill[r] > 0) ? 0 : 1;
+    downhill.array() *= free.array();
+    double size = downhill.squaredNorm();
+    if (enough < 0) enough = 1e-20 * size;
+    if (size <= enough) break;
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(z.size()), direction = downhill, steepest;
+    for (int k = 0; k < options.iterations && size > enough; ++k) {
+      const Eigen::VectorXd image = a * direction;
+      const double length = size / (image.squaredNorm() + shift * direction.squaredNorm());
+      step += length * direction;
+      if (k == 0) steepest = step;
+      downhill -= length * free.cwiseProduct(a.transpose() * image + shift * direction);
+      const double next = downhill.squaredNorm();
+      direction = downhill + next / size * direction;
+      size = next;
+    }
+    if (!moves(step) && !moves(steepest)) break;  // at the bottom within rounding
   }
   return z;
 }
@@ -116,8 +139,7 @@ void weigh_rows(const Body& body, const AffineMap& map, const std::vector<Scalar
       equations.row(i) *= scale;
       missing[i] *= scale;
     }
-    const Eigen::VectorXd factor =
-        (1 + damped_least_squares(equations, missing, options).array()).max(options.least).min(options.most);
+    const Eigen::VectorXd factor = 1 + bounded_least_squares(equations, missing, options).array();
     // What the bounds take or give is made up for by all rows of the panel alike.
     std::vector<double> shared(body.panels().size(), 0), weighed(shared);
     for (std::size_t k = 0; k < members.size(); ++k) {
@@ -136,6 +158,21 @@ void weigh_rows(const Body& body, const AffineMap& map, const std::vector<Scalar
     ++count[row.panel];
   }
   for (StrainRow& row : rows) row.area = std::max(row.area, least_area * sum[row.panel] / count[row.panel]);
+}
+
+Eigen::Vector2d unbalanced_part(const Body& body, const AffineMap& map, const std::vector<StrainRow>& rows) {
+  const Eigen::MatrixX3d whole = map.free_part().transpose() * integrals(body);
+  Eigen::Vector2d part;
+  for (const bool warp : {false, true}) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(body.point_count());
+    for (const StrainRow& row : rows)
+      for (std::size_t k = 0; row.warp == warp && k < row.row.index.size(); ++k)
+        sum[row.row.index[k]] += row.area * row.row.value[k];
+    const auto wanted = whole.col(warp ? 2 : 1);
+    const double size = wanted.lpNorm<1>();
+    part[warp ? 1 : 0] = size > 0 ? (map.free_part().transpose() * sum - wanted).lpNorm<1>() / size : 0;
+  }
+  return part;
 }
 
 }  // namespace toile

@@ -13,18 +13,23 @@ namespace toile {
 // rows[r]. They start from shares: each node of the map divides its own cloth among the points that its function
 // reaches, in proportion to the function where that is positive, so that they add up to the panels' area. Weft and warp
 // are then weighed each by itself, between `least` and `most` times the share, so that
-//   sum over r of area_r d_r = integral over the cloth of N_,weft (N_,warp)   for every node, in least squares:
-// a uniform stress of the limit is in equilibrium with what the cloth's border carries. On a uniform net at p = 2 that
-// is the trapezoidal rule along the threads and Simpson's across.
+//   sum over r of area_r d_r = integral over the cloth of N_,weft (N_,warp)   for every node,
+// in least squares with these bounds (areas found without them and cut afterwards are no solution): a uniform stress of
+// the limit is in equilibrium with what the cloth's border carries. On a uniform net at p = 2 that is the trapezoidal
+// rule along the threads and Simpson's across.
 //   (1) they still add up to the panels' area, but for nodes that reach no point; (2) independent of which nodes pins
 //       hold, but for control points that would follow others (extended, at smooth seams) if no pin held them; (3) no
 //       area is below a thousandth of the panel's mean: such a row would count as hard.
 struct RowAreaOptions {
-  double least = 0.2, most = 3;  // a row that others can stand for needn't vanish, nor one take over its neighbours
-  double damping = 1e-3;  // of a panel's longest equation: poorly determined weights stay near their initial share
-  int iterations = 200;   // at most: what is undetermined by then stays near the shares
+  double least = 0.02, most = 3;  // a row that others can stand for needn't vanish, nor one take over its neighbours
+  double damping = 3e-5;  // of a panel's longest equation: poorly determined weights stay near their initial share
+  int newton_steps = 100, iterations = 40;  // at most, and of each: what is undetermined by then stays near the shares
 };
 void weigh_rows(const Body& body, const AffineMap& map, const std::vector<ScalarRow>& values,
                 std::vector<StrainRow>& rows, const RowAreaOptions& options = {});
+
+// What those areas leave over in weft and warp: |sum of area_r d_r - integral of N_,a| over |integral of N_,a|, in the
+// sum of absolute values over the free nodes.
+Eigen::Vector2d unbalanced_part(const Body& body, const AffineMap& map, const std::vector<StrainRow>& rows);
 
 }  // namespace toile

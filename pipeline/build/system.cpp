@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "analysis/constraint/row_areas.h"
 #include "analysis/constraint/select_rows.h"
 #include "analysis/projection/fast_projection.h"
 #include "analysis/projection/lagrange_newton.h"
@@ -265,6 +266,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     for (const BuiltPanel& panel : build.panels)
       means.insert(means.end(), panel.mean_rows.begin(), panel.mean_rows.end());
     rows.strain = select_rows(*build.model, *system->map, system->points, rows.place, means);
+    if (means.empty()) system->unbalanced = unbalanced_part(*build.model, *system->map, rows.strain);
     if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::second_order) {
       std::vector<double> stiffness, rate;
       for (std::size_t k = 0; k < build.panels.size(); ++k) {

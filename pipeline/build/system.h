@@ -23,7 +23,8 @@ struct System {
   std::vector<std::vector<ConstraintPoint>> points, extra_points;
   std::vector<std::string> warnings;  // pins that hold what others hold
   int strain_rows = 0, place_rows = 0;
-  std::vector<int> place_pin;  // pin of each place row
+  std::optional<Eigen::Vector2d> unbalanced;  // unbalanced_part() of the strain rows, where they are of points
+  std::vector<int> place_pin;                 // pin of each place row
   std::unique_ptr<AffineMap> map;
   std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
   MechanicalSystem dynamic;

@@ -48,12 +48,13 @@ struct Marker {
 };
 const Marker& marker(PointKind kind) {
   constexpr double pi = 3.14159265358979;
-  static const std::array<Marker, 6> markers{{{"#2166ac", 0, 0, "vertex: knot vertex in the material"},
+  static const std::array<Marker, 7> markers{{{"#2166ac", 0, 0, "vertex: knot vertex in the material"},
                                               {"#c0392b", 4, 0, "crossing_u: trim meets u = const"},
                                               {"#1e8449", 4, pi / 4, "crossing_v: trim meets v = const"},
                                               {"#c0392b", 3, 0, "tangent_u: trim touches u = const"},
                                               {"#1e8449", 3, pi, "tangent_v: trim touches v = const"},
-                                              {"#6c3483", 6, 0, "crossing_uv: trim through a knot vertex"}}};
+                                              {"#6c3483", 6, 0, "crossing_uv: trim through a knot vertex"},
+                                              {"#c77700", 5, 0, "corner: the trim turns"}}};
   return markers[static_cast<std::size_t>(kind)];
 }
 
@@ -460,7 +461,7 @@ void draw_legend(Svg& svg, Vector2d at, double width) {
     words(text);
     next();
   }
-  for (int k = 0; k < 6; ++k) {
+  for (int k = 0; k < 7; ++k) {
     draw_marker(svg, at + Vector2d(x + 7, 0), static_cast<PointKind>(k), true, 5);
     words(marker(static_cast<PointKind>(k)).words);
     next();

@@ -202,7 +202,7 @@ std::string curves_text(const InspectedPanel& panel) {
 std::string points_text(const InspectedPanel& panel) {
   std::string out = fmt::format("\npoints of '{}'\n  {:<12} {:>5}  {:>5}\n", panel.face.name, "kind", "all", "used");
   for (const PointKind kind : {PointKind::vertex, PointKind::crossing_u, PointKind::crossing_v, PointKind::tangent_u,
-                               PointKind::tangent_v, PointKind::crossing_uv}) {
+                               PointKind::tangent_v, PointKind::crossing_uv, PointKind::corner}) {
     const auto all = std::ranges::count(panel.points, kind, &ConstraintPoint::kind);
     const auto used =
         std::ranges::count_if(panel.points, [&](const ConstraintPoint& p) { return p.kind == kind && p.used; });

@@ -161,6 +161,8 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   if (system.strain_rows > 0) {
     report["stress"]["raw"] = stress(m.raw_nominal);
     report["stress"]["raw"]["second_pk"] = stress(m.raw_second_pk);
+    if (const auto& part = system.unbalanced)
+      report["stress"]["unbalanced"] = {{"weft", part->x()}, {"warp", part->y()}};
   }
   report["energy"] = Json::object();
   for (const auto& [what, joule] : energy_entries(run.energy)) report["energy"][what] = joule;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -12,6 +13,7 @@
 
 #include "analysis/shell/shell_model.h"
 #include "geometry/nurbs_surface.h"
+#include "geometry/trimmed_surface.h"
 #include "trimming/quadrature.h"
 
 namespace toile::test {
@@ -92,6 +94,24 @@ inline NurbsSurface flat_surface(double width, double height, KnotVector u, Knot
       points.col(i + u.control_point_count() * j) << width * (u.greville(i) - u.domain().min) / u.domain().length(),
           height * (v.greville(j) - v.domain().min) / v.domain().length(), 0;
   return {std::move(u), std::move(v), points};
+}
+
+// A unit square about the origin of the plane z = 0 as a trim, in a square surface of edge `size` whose net is turned
+// by `angle` [rad]. Curves 0 to 3 run from corner (-1/2, -1/2) counter-clockwise.
+inline TrimmedSurface turned_square(int degree, int spans, double size, double angle) {
+  const KnotVector knots = uniform_knots(degree, spans, {-size / 2, size / 2});
+  const NurbsSurface flat = flat_surface(size, size, knots, knots);
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  TrimmedSurface face;
+  face.surface = flat.with_points(turn * (flat.points().colwise() - Eigen::Vector3d(size / 2, size / 2, 0)));
+  const Eigen::Vector2d corners[] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
+  const Eigen::Rotation2Dd back(-angle);
+  TrimLoop loop;
+  for (int k = 0; k < 4; ++k) {
+    loop.curves.push_back({line_segment<2>(back * corners[k], back * corners[(k + 1) % 4]), k, false, {}});
+  }
+  face.loops = {std::move(loop)};
+  return face;
 }
 
 inline ClothPanel make_panel(NurbsSurface rest, const Fabric& fabric = {}, double grain = 0) {

@@ -88,8 +88,33 @@ TEST(ConstraintPoints, OrderIsVerticesThenTheLoop) {
   ASSERT_EQ(points.size(), 9u + 12u);
   for (std::size_t k = 1; k < 9; ++k) EXPECT_LT(points[k - 1].v * 10 + points[k - 1].u, points[k].v * 10 + points[k].u);
   for (std::size_t k = 10; k < points.size(); ++k) EXPECT_LT(points[k - 1].t, points[k].t);
-  // A trim corner or joint off every knot line is none.
+  // A smooth joint off every knot line is none.
   for (const ConstraintPoint& p : points) EXPECT_TRUE(p.u == std::floor(p.u) || p.v == std::floor(p.v));
+}
+
+TEST(ConstraintPoints, CornersStandWhereATrimTurnsByMoreThanThirtyDegrees) {
+  const Vector2d a(3.5, 2.5), b(2.5, 3.5);
+  TrimmedSurface face = trimmed(unit_cells(4), {polygon_loop({{0.5, 0.5}, {3.5, 0.5}, a, b, {0.5, 3.5}}),
+                                                backwards(loop_of({round_curve({1.5, 1.5}, 0.25, 0.25)}))});
+  std::vector<Vector2d> corners;
+  for (const ConstraintPoint& p : points_of(face)) {
+    if (p.kind != PointKind::corner) continue;
+    corners.emplace_back(p.u, p.v);
+    EXPECT_EQ(p.loop, 0);
+    EXPECT_EQ(p.curve, static_cast<int>(corners.size()) - 1);
+    EXPECT_EQ(p.t, 0);
+  }
+  EXPECT_EQ(corners, (std::vector<Vector2d>{{0.5, 0.5}, {3.5, 0.5}, a, b, {0.5, 3.5}}));
+  // On the surface, not in its parameters: drawn out eight times, both ends of the cut turn by 83 and 7 degrees.
+  const Eigen::Vector3d drawn_out(8, 1, 1);
+  face.surface = face.surface.with_points(drawn_out.asDiagonal() * face.surface.points());
+  corners.clear();
+  for (const ConstraintPoint& p : constraint_points(face, trace_trims(face)))
+    if (p.kind == PointKind::corner) corners.emplace_back(p.u, p.v);
+  EXPECT_EQ(corners, (std::vector<Vector2d>{{0.5, 0.5}, {3.5, 0.5}, a, {0.5, 3.5}}));
+  // One on a knot line is a crossing already.
+  TrimmedSurface on_line = trimmed(unit_cells(4), {polygon_loop({{1, 0.5}, {3, 0.5}, {3, 3.5}, {1, 3.5}})});
+  for (const ConstraintPoint& p : points_of(on_line)) EXPECT_NE(p.kind, PointKind::corner);
 }
 
 }  // namespace

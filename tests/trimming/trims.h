@@ -237,7 +237,8 @@ inline Tally tally(const TrimTopology& topology) {
         ++t.crossing_uv;
         break;
       case PointKind::vertex:
-        ADD_FAILURE() << "an event is no inner vertex";
+      case PointKind::corner:
+        ADD_FAILURE() << "no kind of an event";
     }
   }
   for (const CellKind kind : topology.cells) {
