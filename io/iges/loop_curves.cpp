@@ -361,9 +361,11 @@ class LoopCurves {
     return {};
   }
 
-  // Model curves head to tail: each may run either way.
-  static void chain(std::vector<Curve3>& curves) {
-    const auto gap = [](const Vector3d& a, const Vector3d& b) { return (a - b).norm(); };
+  // Model curves head to tail: each may run either way. Where both ways meet, as in a circle of two halves, the file's
+  // stands: ends that differ by rounding decide nothing.
+  void chain(std::vector<Curve3>& curves) const {
+    const double meeting = std::max(plane_.options.resolution, 1e-6 * plane_.size);
+    const auto gap = [&](const Vector3d& a, const Vector3d& b) { return std::max((a - b).norm(), meeting); };
     for (std::size_t i = 0; i + 1 < curves.size(); ++i) {
       Curve3 &a = curves[i], &b = curves[i + 1];
       if (i == 0) {

@@ -237,6 +237,41 @@ TEST(IgesLoops, MeridiansMeetAtAPoleWhereverTheirLoopBegins) {
       }
 }
 
+// A tube by its two circles, of two halves each, and the seam there and back: both ways round the halves of the first
+// circle meet, to rounding.
+TEST(IgesLoops, RoundingDoesntTurnTheHalvesOfACircle) {
+  const double radius = 2, height = 3;
+  const auto line = [](const Vector3d& a, const Vector3d& b) {
+    Eigen::Matrix3Xd points(3, 2);
+    points << a, b;
+    return Curve3(KnotVector(1, {0, 0, 1, 1}), points);
+  };
+  const Vector3d low(radius, 0, 0), high(radius, 0, height);
+  const auto half = [&](double from, double to, double z, const Vector3d& move_end) {
+    const Curve2 arc = circular_arc({0, 0}, radius, from, to);
+    Eigen::Matrix3Xd points(3, arc.points().cols());
+    points << arc.points(), Eigen::RowVectorXd::Constant(arc.points().cols(), z);
+    points.col(0) = from == 0 ? (z == 0 ? low : high) : Vector3d(-radius, 0, z);
+    points.rightCols<1>() = (to == pi ? Vector3d(-radius, 0, z) : (z == 0 ? low : high)) + move_end;
+    return Curve3(arc.knots(), points, arc.weights());
+  };
+  for (const double rounding : {0.0, 1e-15}) {
+    const Vector3d move(0, rounding, 0), none(0, 0, 0);
+    iges::BoundaryCurves loop;
+    loop.place = "here: ";
+    loop.model = {half(0, pi, 0, move),
+                  half(pi, 2 * pi, 0, none),
+                  line(low, high),
+                  reversed(half(pi, 2 * pi, height, none)),
+                  reversed(half(0, pi, height, none)),
+                  line(high, low)};
+    const Result r =
+        panels_of(iges::revolved(line(low, high), Vector3d::Zero(), Vector3d::UnitZ(), {0, 2 * pi}), {loop});
+    ASSERT_EQ(r.panels.size(), 1u) << rounding;
+    expect_near_rel(r.area, 2 * pi * radius * height, 1e-9);
+  }
+}
+
 TEST(IgesLoops, ANarrowGapIsClosedByAStraightPieceAndSaid) {
   for (const double gap : {2e-3, 9e-3}) {
     SCOPED_TRACE(gap);
