@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <span>
 
 #include "geometry/error.h"
 #include "support/near.h"
@@ -163,6 +165,76 @@ TEST(TimeStep, BoundsTheLargestEigenvalueOfTheDenseMatrix) {
         EXPECT_GE(bound, largest * (1 - 1e-9));
         EXPECT_LE(bound, largest * 1.03);
       }
+}
+
+// Points held by springs: the stiffness is a given matrix [N/m]. The first change of position asked of it is kept.
+class Springs final : public Model, public Potential {
+ public:
+  explicit Springs(Eigen::MatrixXd stiffness) : Model(data_of(stiffness.rows() / 3)), k_(std::move(stiffness)) {}
+  mutable Eigen::VectorXd first;
+
+  std::vector<const Potential*> potentials() const override { return {this}; }
+  void add_force_change(const Eigen::Ref<const Eigen::VectorXd>&, const Eigen::Ref<const Eigen::VectorXd>& dq,
+                        Eigen::Ref<Eigen::VectorXd> df, TangentKind, Workers*) const override {
+    if (first.size() == 0) first = dq;
+    df -= k_ * dq;
+  }
+  void add_force(const Eigen::Ref<const Eigen::VectorXd>& q, Eigen::Ref<Eigen::VectorXd> force, Elastic&,
+                 Workers*) const override {
+    force -= k_ * q;
+  }
+  std::vector<std::vector<int>> couplings() const override { return {}; }
+  std::vector<int> slots(const BlockPattern&) const override { return {}; }
+  void add_hessian(const Eigen::Ref<const Eigen::VectorXd>&, TangentKind, std::span<const int>, BlockMatrix&,
+                   Workers*) const override {}
+  CellShare stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>&,
+                          const Eigen::Ref<const Eigen::VectorXd>&) const override {
+    return {};
+  }
+  std::size_t table_bytes() const override { return 0; }
+  Eigen::Matrix3Xd net(int, const Eigen::Ref<const Eigen::VectorXd>& q) const override {
+    return q.reshaped(3, q.size() / 3);
+  }
+  ScalarRow place(int, double, double) const override { return {}; }
+  MaterialPoint material_point(int, double, double) const override { return {}; }
+  MaterialState state(int, double, double, const Eigen::Ref<const Eigen::VectorXd>&) const override { return {}; }
+
+ private:
+  static std::unique_ptr<Data> data_of(Eigen::Index points) {
+    auto data = std::make_unique<Data>();
+    data->first = {0, static_cast<int>(points)};
+    data->rest = Eigen::VectorXd::Zero(3 * points);
+    data->lumped_mass = data->lumped_drag = Eigen::VectorXd::Ones(points);
+    return data;
+  }
+  Eigen::MatrixXd k_;
+};
+
+// All eigenvalues lie within 2 % but for one, 5 % larger, whose vector the search's start holds by a hair: for a dozen
+// iterations the others look like all there is.
+TEST(TimeStep, FindsAnEigenvalueThatItsStartHides) {
+  const int points = 40;
+  const Eigen::Index n = 3 * points;
+  const AffineMap map(AffineMap::identity(points), {}, nullptr);
+  const Eigen::VectorXd mass = Eigen::VectorXd::Ones(points), q = Eigen::VectorXd::Zero(n);
+  const auto bound = [&](const Springs& springs) { return time_step_bound(springs, map, mass, q).eigenvalue; };
+  const Springs asked(Eigen::MatrixXd::Identity(n, n));
+  bound(asked);
+  const Eigen::VectorXd start = asked.first.normalized();
+  const double largest = 1.05;
+  for (const double hair : {1e-2, 1e-6, 1e-9, 1e-12}) {
+    Eigen::VectorXd hidden = Random(5).vector(n);
+    hidden = (hidden - hidden.dot(start) * start).normalized() + hair * start;
+    hidden.normalize();
+    // A reflection that takes the first axis there.
+    const Eigen::VectorXd across = (Eigen::VectorXd::Unit(n, 0) - hidden).normalized();
+    const Eigen::MatrixXd turn = Eigen::MatrixXd::Identity(n, n) - 2 * across * across.transpose();
+    Eigen::VectorXd eigenvalues = Eigen::VectorXd::LinSpaced(n, 0.98, 1);
+    eigenvalues[0] = largest;
+    const double found = bound(Springs(turn * eigenvalues.asDiagonal() * turn));
+    EXPECT_GE(found, largest * (1 - 1e-9)) << hair;
+    EXPECT_LE(found, largest * 1.03) << hair;
+  }
 }
 
 // Measured with an independent computation on uniform panels.
