@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "geometry/error.h"
 #include "geometry/measure.h"
@@ -45,6 +46,15 @@ double CurveOnSurface::speed(double t) const {
   const CurveJet<2> c = evaluate(curve_, t);
   const SurfaceJet s = evaluate(surface_, c.x.x(), c.x.y());
   return (s.u * c.d1.x() + s.v * c.d1.y()).norm();
+}
+
+double CurveOnSurface::cells(double t) const {
+  const CurveJet<2> c = evaluate(curve_, t);
+  const auto spans = [](const KnotVector& knots, double u, double du) {
+    const int k = knots.find_span(u);
+    return du / (knots[k + 1] - knots[k]);
+  };
+  return std::hypot(spans(surface_.u(), c.x.x(), c.d1.x()), spans(surface_.v(), c.x.y(), c.d1.y()));
 }
 
 double CurveOnSurface::parameter(double fraction) const {
@@ -178,6 +188,75 @@ std::vector<PathPart> path_of(const Address& at, const std::vector<CurvePosition
   return named;
 }
 
+// Parts that follow each other, measured in cells.
+class PathInCells {
+ public:
+  // The parts must outlive it.
+  explicit PathInCells(std::span<const PathPart> parts) {
+    for (const PathPart& part : parts) {
+      const std::vector<double> t = part.path.breaks(part.from, part.to);
+      for (std::size_t k = 1; k < t.size(); ++k) {
+        pieces_.push_back({&part.path, t[k - 1], t[k], length_});
+        length_ += cells(pieces_.back(), t[k]);
+      }
+    }
+  }
+  double length() const { return length_; }
+  Eigen::Vector2d start() const { return pieces_.front().path->uv(pieces_.front().from); }
+  Eigen::Vector2d end() const { return pieces_.back().path->uv(pieces_.back().to); }
+  // Newton's method within ever nearer bounds.
+  Eigen::Vector2d at(double length) const {
+    const auto above = std::ranges::upper_bound(pieces_, length, {}, &Piece::before);
+    const Piece& piece = above == pieces_.begin() ? pieces_.front() : *(above - 1);
+    double low = piece.from, high = piece.to, t = low;
+    for (int k = 0; k < 100; ++k) {
+      const double beyond = piece.before + cells(piece, t) - length;
+      (beyond < 0 ? low : high) = t;
+      double next = t - beyond / piece.path->cells(t);
+      if (!(next > low && next < high)) next = low + (high - low) / 2;
+      if (std::abs(next - t) <= 1e-14 * (piece.to - piece.from)) break;
+      t = next;
+    }
+    return piece.path->uv(t);
+  }
+
+ private:
+  struct Piece {
+    const CurveOnSurface* path = nullptr;
+    double from = 0, to = 0;  // parameters of the curve
+    double before = 0;        // length up to it
+  };
+  static double cells(const Piece& piece, double t) {
+    return gauss8([&](double s) { return piece.path->cells(s); }, piece.from, t);
+  }
+
+  std::vector<Piece> pieces_;
+  double length_ = 0;
+};
+
+// Adds what holds one stretch of a curve; `required` of its points come first in `out`.
+void hold_along(std::span<const PathPart> parts, const NurbsSurface& surface, HeldPlace& out) {
+  constexpr double open_spacing = 1, closed_spacing = 1.15;  // spans
+  constexpr int places = 200;
+  const PathInCells path(parts);
+  const Eigen::Vector2d a = path.start(), b = path.end();
+  double length = 0;
+  for (const PathPart& part : parts) length += (part.to - part.from) * part.path.length();
+  const bool closed = (surface(a.x(), a.y()) - surface(b.x(), b.y())).norm() <= 1e-9 * length;
+  const int degree = std::max(surface.u().degree(), surface.v().degree());
+  const int n = std::max(static_cast<int>(std::lround(path.length() / (closed ? closed_spacing : open_spacing))),
+                         closed ? 2 * degree + 1 : degree);
+  const auto point = [&](int k) -> Eigen::Vector2d { return k == 0 ? a : k == n ? b : path.at(path.length() * k / n); };
+  const std::vector<int> first = closed ? std::vector<int>{0, n / 3, 2 * n / 3} : std::vector<int>{0, n};
+  std::vector<Eigen::Vector2d> required;
+  for (const int k : first) required.push_back(point(k));
+  out.points.insert(out.points.begin() + static_cast<std::ptrdiff_t>(out.required), required.begin(), required.end());
+  out.required += required.size();
+  for (int k = 1; k < n; ++k)
+    if (std::ranges::find(first, k) == first.end()) out.points.push_back(point(k));
+  for (int k = 0; k < places; ++k) out.curve.push_back(path.at(path.length() * (k + 0.5) / places));
+}
+
 // The edge of the domain that curves cover from end to end, if they do.
 std::optional<Edge> whole_edge(const std::vector<const Curve2*>& curves, const NurbsSurface& surface) {
   for (int direction = 0; direction < 2; ++direction) {
@@ -278,14 +357,14 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
         break;
       }
       if (clamp) no_clamp(who);
-      held.every_point = false;
-      for (const PathPart& part : path_of(at, pieces, panel)) {
-        const std::vector<double> t = part.path.breaks(part.from, part.to);
-        for (std::size_t k = 0; k < t.size(); ++k) {
-          if (k > 0) held.points.push_back(part.path.uv((t[k - 1] + t[k]) / 2));
-          const Eigen::Vector2d uv = part.path.uv(t[k]);
-          if (held.points.empty() || held.points.back() != uv) held.points.push_back(uv);  // pieces share their ends
-        }
+      const std::vector<PathPart> parts = path_of(at, pieces, panel);
+      const auto ends = [](const PathPart& part, double fraction) {
+        return part.path.uv(part.path.parameter(fraction));
+      };
+      for (std::size_t first = 0, k = 1; k <= parts.size(); ++k) {
+        if (k < parts.size() && ends(parts[k - 1], parts[k - 1].to) == ends(parts[k], parts[k].from)) continue;
+        hold_along(std::span(parts).subspan(first, k - first), surface, held);
+        first = k;
       }
       break;
     }
@@ -309,7 +388,7 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
         }
       }
       if (clamp) no_clamp(who);
-      if (held.control_points.empty()) held.points.push_back(at.uv);
+      if (held.control_points.empty()) held.points.push_back(at.uv), held.required = 1;
       break;
     }
     case Address::Kind::control_point: {

@@ -24,6 +24,7 @@ class CurveOnSurface {
   double parameter(double fraction) const;  // of the curve at a fraction of the length
   Eigen::Vector2d uv(double t) const;
   double speed(double t) const;  // |dx/dt|
+  double cells(double t) const;  // the same where spans of the knots, du and dv, count 1
   // Ends of smooth pieces within [from, to] (fractions), both included, ascending.
   std::vector<double> breaks(double from, double to) const;
 
@@ -39,11 +40,19 @@ struct LinePoint {
   double weight = 0;  // m
 };
 
-// What a pin holds: control points (exactly), or material points, of which rows are chosen by rank.
+// What a pin holds: control points (exactly), or material points, which become rows.
+//
+// Along a curve the points are even in cells: one a span where it is open, one per 1.15 spans where it closes. A spline
+// that vanishes along a curve is divisible by the curve's polynomial, so that denser rows hold the slope across the
+// curve too, at some places more than at others. Curves of few spans have at least degree + 1 points, closed ones
+// 2 degree + 1.
 struct HeldPlace {
   std::vector<int> control_points;      // of the panel's net, ascending
   std::vector<Eigen::Vector2d> points;  // parameters
-  bool every_point = true;              // false: as many of `points` as are independent (a curve)
+  // Of `points` so many must be held by rows; of the others as many as are independent enough. Of a curve: both ends
+  // where it is open, three points where it closes.
+  std::size_t required = 0;
+  std::vector<Eigen::Vector2d> curve;  // 200 places along the curve: what the rows don't hold shows as gaps there
 };
 
 // A panel as addresses see it.

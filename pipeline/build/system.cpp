@@ -21,8 +21,9 @@
 namespace toile {
 namespace {
 
-// Rows of a curve pin depend on each other; below this part of a row's own size it adds nothing that others don't hold.
-constexpr double smallest_place_pivot = 1e-3;
+// Part of a row's inertia that rows before it must leave free for the row to be taken: less would hold little that
+// others don't, and solve badly. What the scene asks for by name is held down to what can be solved at all.
+constexpr double smallest_place_pivot = 1e-3, smallest_curve_pivot = 0.2;
 // Starting threads takes some microseconds: with fewer points a step by one is as fast.
 constexpr int least_points_for_threads = 2000;
 
@@ -40,12 +41,11 @@ std::vector<int> on_both_sides(const std::vector<int>& control_points, const std
 struct Candidate {
   ScalarRow row;
   int pin = 0;
-  bool required = false;
+  bool required = false;  // more than one of several along a curve
 };
 
 // Which candidates are independent of those before them and of the fixed control points: sparse Cholesky of the rows'
-// inertia N M^-1 N^T scaled to unit diagonal; those that must be held come first, then always the least dependent one
-// left.
+// inertia N M^-1 N^T scaled to unit diagonal, in the order given; those that must be held come first.
 std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
                               const Eigen::VectorXd& mass) {
   const int n = static_cast<int>(candidates.size());
@@ -74,23 +74,18 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
     }
   }
   std::vector<bool> taken(candidates.size(), false);
-  for (bool required : {true, false}) {
-    while (true) {
-      int best = -1;
-      for (int k = 0; k < n; ++k) {
-        const auto& c = candidates[static_cast<std::size_t>(k)];
-        if (taken[static_cast<std::size_t>(k)] || c.required != required || left[k] < smallest_place_pivot) continue;
-        if (best < 0 || (!required && left[k] > left[best] * (1 + 1e-9))) best = k;
-      }
-      if (best < 0) break;
-      taken[static_cast<std::size_t>(best)] = true;
-      const std::map<int, double> pivot = std::move(gram[static_cast<std::size_t>(best)]);
+  for (const bool required : {true, false}) {
+    const double least = required ? smallest_place_pivot : smallest_curve_pivot;
+    for (int next = 0; next < n; ++next) {
+      if (candidates[static_cast<std::size_t>(next)].required != required || left[next] < least) continue;
+      taken[static_cast<std::size_t>(next)] = true;
+      const std::map<int, double> pivot = std::move(gram[static_cast<std::size_t>(next)]);
       for (const auto& [k, at_k] : pivot) {
         auto& row = gram[static_cast<std::size_t>(k)];
-        row.erase(best);
-        left[k] -= at_k * at_k / left[best];
+        row.erase(next);
+        left[k] -= at_k * at_k / left[next];
         for (const auto& [l, at_l] : pivot) {
-          if (l != k) row[l] -= at_k * at_l / left[best];
+          if (l != k) row[l] -= at_k * at_l / left[next];
         }
       }
     }
@@ -158,6 +153,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   };
   std::vector<Held> held;
   std::vector<Candidate> candidates;
+  std::vector<PlaceRow> along_curves;
   std::vector<Eigen::Vector3d> mean(scene.pins.size(), Eigen::Vector3d::Zero());
   for (std::size_t p = 0; p < scene.pins.size(); ++p) {
     const ScenePin& pin = scene.pins[p];
@@ -188,12 +184,15 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
       candidates.push_back({{{build.model->first_point(k) + i}, {1.0}}, static_cast<int>(p), true});
     }
     if (points == 0) std::ranges::for_each(followers, count);
-    for (const Eigen::Vector2d& uv : place.points) {
-      candidates.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), place.every_point});
+    for (std::size_t i = 0; i < place.points.size(); ++i) {
+      const Eigen::Vector2d& uv = place.points[i];
+      candidates.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), i < place.required});
       mean[p] += apply(candidates.back().row, build.start);
       ++points;
     }
     mean[p] /= points;
+    for (const Eigen::Vector2d& uv : place.curve)
+      along_curves.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), {}});
   }
   std::ranges::stable_sort(held, {}, &Held::control_point);
   std::vector<Held> fixed;
@@ -256,6 +255,11 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     rows.place.push_back({c.row, pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
     system->place_pin.push_back(pin);
   }
+  for (PlaceRow& place : along_curves) {
+    const Eigen::Vector3d from = apply(place.row, build.start);
+    place.target = [moved, pin = place.pin, from](double time) { return moved(pin, from, time); };
+  }
+  system->along_curves = std::move(along_curves);
   for (const BuiltPanel& panel : build.panels) {
     system->points.push_back(panel.points);
     system->points.back().insert(system->points.back().end(), panel.extra_points.begin(), panel.extra_points.end());

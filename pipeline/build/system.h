@@ -25,6 +25,7 @@ struct System {
   int strain_rows = 0, place_rows = 0;
   std::optional<Eigen::Vector2d> unbalanced;  // unbalanced_part() of the strain rows, where they are of points
   std::vector<int> place_pin;                 // pin of each place row
+  std::vector<PlaceRow> along_curves;         // 200 places along each curve that a pin holds by some of its points
   std::unique_ptr<AffineMap> map;
   std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
   MechanicalSystem dynamic;

@@ -207,6 +207,15 @@ void warn_of_end(const Build& built, RunResult& result, const StateMeasures& mea
         fmt::format("{} of {} steps did not meet the strain limit or the pins within {} iterations",
                     result.unconverged_steps, result.steps, built.scene.strain_limit.max_iterations));
   }
+  constexpr double wide_gap = 5e-4;  // m
+  for (std::size_t k = 0; k < measures.gaps.size(); ++k) {
+    if (measures.gaps[k].value_or(0) <= wide_gap) continue;
+    const ScenePin& pin = built.scene.pins[k];
+    result.warnings.push_back(fmt::format(
+        "{}: pin {} ({}): between the points held the cloth is up to {:.2g} mm off the curve; smaller cells "
+        "(refine) hold it nearer",
+        pin.where, k, pin.at.text, 1000 * *measures.gaps[k]));
+  }
   if (const std::string between = strained_between_points(built, measures); !between.empty())
     result.warnings.push_back(between);
 }

@@ -155,6 +155,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   for (std::size_t k = 0; k < m.reactions.size(); ++k) {
     report["reactions"].push_back(
         {{"pin", k}, {"panel", scene.pins[k].panel}, {"at", scene.pins[k].at.text}, {"force", array(m.reactions[k])}});
+    if (m.gaps[k]) report["reactions"].back()["gap"] = *m.gaps[k];
   }
   report["stress"] = stress(m.nominal);
   report["stress"]["second_pk"] = stress(m.second_pk);

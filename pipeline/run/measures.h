@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,8 @@ struct StateMeasures {
   double area = 0, mass = 0;               // m2, kg, of the rest
   std::vector<Eigen::Vector3d> points;     // those that the scene asks for [m]
   std::vector<Eigen::Vector3d> reactions;  // per pin: force on the cloth [N]
+  // Per pin along a curve: how far the cloth is from where the pin has it, at most, at 200 places along the curve [m].
+  std::vector<std::optional<double>> gaps;
 };
 // `dt`: of the last step [s], 0 before the first, where nothing is known of the forces of pins and limits.
 StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt);
