@@ -75,8 +75,10 @@ class Resolver {
   }
   bool in(int e, int loop, bool left) const { return winding(edge(e), loop, left) != 0; }
 
-  // A loop winds once around what it bounds, everywhere in one direction.
-  void check_loops() const {
+  // A loop winds once around what it bounds, everywhere in one direction. A hole may bound nothing: a line out and
+  // back.
+  void check_loops() {
+    bare_.assign(loops_.size(), false);
     for (const int l : members_) {
       int seen = 0;
       for (const int e : edges_)
@@ -86,7 +88,8 @@ class Resolver {
           if (seen != 0 || std::abs(w) > 1) refuse("loop " + number(l) + " crosses itself", edge(e).middle);
           seen = w;
         }
-      if (seen == 0) refuse("loop " + number(l) + " bounds nothing", edge(edges_.front()).middle);
+      bare_[index(l)] = seen == 0;
+      if (seen == 0 && !(known_ && l > 0)) refuse("loop " + number(l) + " bounds nothing", edge(edges_.front()).middle);
     }
   }
   std::string number(int l) const { return std::to_string(loops_[index(l)].index); }
@@ -113,7 +116,7 @@ class Resolver {
     if (members_.front() != 0) return;  // holes only: their union
     outer_ = 0;
     for (const int l : members_) {
-      if (l == 0) continue;
+      if (l == 0 || bare_[index(l)]) continue;
       const Overlap o = overlap(0, l);
       if (!o.first && !o.second)
         refuse("loop " + number(l) + " is the outer loop again: nothing is left", edge(*o.both).middle);
@@ -121,7 +124,7 @@ class Resolver {
     }
     std::vector<int> outside;
     for (const int l : members_)
-      if (l != outer_ && !overlap(outer_, l).both) outside.push_back(l);
+      if (l != outer_ && !bare_[index(l)] && !overlap(outer_, l).both) outside.push_back(l);
     nest(outside);
     // A loop that lies beside the outer one is a second outer loop where it is around others, else it takes nothing
     // away.
@@ -427,7 +430,7 @@ class Resolver {
   Material& out_;
   std::vector<int> members_, edges_;
   int outer_ = nothing;
-  std::vector<bool> beside_;
+  std::vector<bool> beside_, bare_;
   std::vector<Border> borders_;
   std::vector<std::vector<int>> of_edge_;   // borders of each edge
   std::map<int, std::vector<int>> out_of_;  // borders that leave each vertex

@@ -230,6 +230,33 @@ TEST(Material, AnEdgeRunOutAndBackIsASlit) {
   EXPECT_EQ(*curved.marks[0].curve, dart);
 }
 
+// A cut within a panel: a hole without area. It may lie by itself, begin on the outer loop, cross another hole.
+TEST(Material, AHoleThatIsALineOutAndBackIsASlit) {
+  const TrimLoop outer = polygon_loop(box(0, 0, 4, 4));
+  const auto cut = [](const Vector2d& a, const Vector2d& b) { return polygon_loop({a, b}); };
+  const Facts inside = facts(with_holes(outer, {cut({1, 1}, {3, 1.5})}));
+  EXPECT_EQ(inside.loops, 1u);
+  expect_near_rel(inside.area, 16, 1e-14);
+  ASSERT_EQ(inside.marks.size(), 1u);
+  EXPECT_EQ(inside.marks[0].kind, MarkKind::slit);
+  EXPECT_TRUE(inside.marks[0].text.empty());
+  EXPECT_NEAR(inside.marks[0].curve->start().x() + inside.marks[0].curve->end().x(), 4, 1e-15);
+  ASSERT_EQ(inside.said.size(), 1u);
+  EXPECT_NE(inside.said[0].find("a slit"), std::string::npos);
+
+  const Facts from_border = facts(with_holes(outer, {cut({2, 0}, {2, 1.25})}));
+  expect_near_rel(from_border.area, 16, 1e-14);
+  EXPECT_EQ(from_border.marks.size(), 1u);
+
+  const Facts beside =
+      facts(with_holes(outer, {cut({1, 1}, {1, 2}), polygon_loop(box(2, 2, 3, 3)), cut({2.5, 1}, {2.5, 2.25})}));
+  EXPECT_EQ(beside.loops, 2u);
+  expect_near_rel(beside.area, 15, 1e-14);
+  EXPECT_EQ(beside.marks.size(), 2u);  // the part inside the hole is left out
+
+  EXPECT_NE(refusal(with_holes(cut({1, 1}, {3, 1}), {})).find("loop 0 bounds nothing"), std::string::npos);
+}
+
 TEST(Material, ASpikeOutsideIsLeftOut) {
   const Facts f = facts(with_holes(polygon_loop({{1, 1}, {3, 1}, {3, 2}, {4, 2}, {3, 2}, {3, 3}, {1, 3}}), {}));
   EXPECT_TRUE(f.marks.empty());
