@@ -164,8 +164,8 @@ class Finder {
     if (a0 == 0 && a1 == 0) {
       // On one line: ordered by the direction in which it extends most.
       const int axis = std::abs(da.x()) >= std::abs(da.y()) ? 0 : 1;
-      const auto [a_min, a_max] = std::minmax(a.first()[axis], a.last()[axis]);
-      const auto [b_min, b_max] = std::minmax(b.first()[axis], b.last()[axis]);
+      const auto [a_min, a_max] = std::minmax({a.first()[axis], a.last()[axis]});
+      const auto [b_min, b_max] = std::minmax({b.first()[axis], b.last()[axis]});
       const double low = std::max(a_min, b_min), high = std::min(a_max, b_max);
       if (low > high) return;
       const Vector2d x = a.first()[axis] == low   ? a.first()
