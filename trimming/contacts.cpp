@@ -237,6 +237,7 @@ class Finder {
                          x);
     }
     for (const auto& [kind, x] : found) {
+      if (cusp(line, curve, x) || cusp(curve, line, x)) continue;
       const bool listed = std::ranges::any_of(
           places_, [&, &y = x](const Vector2d& known) { return (known - y).cwiseAbs().maxCoeff() <= cluster_; });
       if (kind != ContactKind::touch || !listed) add(kind, line, curve, x);

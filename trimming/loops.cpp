@@ -2,11 +2,14 @@
 #include "trimming/loops.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <set>
 
 #include "geometry/error.h"
+#include "geometry/measure.h"
+#include "geometry/refine.h"
 #include "trimming/contacts.h"
 #include "trimming/loop_closing.h"
 #include "trimming/material.h"
@@ -18,6 +21,8 @@ namespace {
 
 using Eigen::Vector2d;
 
+constexpr int most_tips = 100;  // that are cut off one face
+
 class Validator {
  public:
   Validator(TrimmedSurface& surface, const LoopOptions& options) : surface_(surface), options_(options) {}
@@ -27,7 +32,13 @@ class Validator {
     repairs_ = close_loops(surface_, options_, true);
     spans_ = trim_spans(surface_.loops);
     std::vector<LoopContact> contacts = find_contacts(surface_.loops, spans_);
-    const auto bad = std::ranges::find_if(contacts, [](const LoopContact& c) { return c.kind != ContactKind::touch; });
+    auto bad = std::ranges::find_if(contacts, not_touching);
+    // Each cut leaves a loop without one of its tips.
+    for (int cuts = 0; cuts < most_tips && bad != contacts.end() && cut_tip(*bad); ++cuts) {
+      spans_ = trim_spans(surface_.loops);
+      contacts = find_contacts(surface_.loops, spans_);
+      bad = std::ranges::find_if(contacts, not_touching);
+    }
     if (bad != contacts.end()) {
       resolve(*bad);
       spans_ = trim_spans(surface_.loops);
@@ -40,6 +51,7 @@ class Validator {
   }
 
  private:
+  static bool not_touching(const LoopContact& c) { return c.kind != ContactKind::touch; }
   [[noreturn]] void fail(const TrimLoop& loop, const TrimCurve* curve, const std::string& what,
                          const Vector2d& uv) const {
     throw GeometryError(place_name(surface_, loop, curve) + ": " + what + " at " + point_text(uv));
@@ -84,6 +96,90 @@ class Validator {
     const TrimLoop& a = surface_.loops[static_cast<std::size_t>(contact.loop_a)];
     throw GeometryError(place_name(surface_, a, &a.curves[static_cast<std::size_t>(contact.curve_a)]) + ": " +
                         contact_text(contact) + " at " + point_text(contact.uv) + gap_text(contact) + why);
+  }
+
+  // The neighbours that meet beyond a contact, in their loop's order.
+  std::optional<std::array<int, 2>> neighbours(const LoopContact& contact) const {
+    const int n = static_cast<int>(surface_.loops[static_cast<std::size_t>(contact.loop_a)].curves.size());
+    if (contact.loop_a != contact.loop_b || n < 3) return std::nullopt;
+    if ((contact.curve_a + 1) % n == contact.curve_b) return std::array{contact.curve_a, contact.curve_b};
+    if ((contact.curve_b + 1) % n == contact.curve_a) return std::array{contact.curve_b, contact.curve_a};
+    return std::nullopt;
+  }
+
+  double distance(const Vector2d& x, const Vector2d& y) const {
+    return (surface_.surface(x.x(), x.y()) - surface_.surface(y.x(), y.y())).norm();
+  }
+
+  // Curves that meet in a cusp may cross before they meet: exporters fit each by itself. The tip beyond the crossing is
+  // cut off where it is narrower than ten times the file's resolution.
+  bool cut_tip(const LoopContact& contact) {
+    const auto pair = neighbours(contact);
+    if (contact.kind != ContactKind::crossing || !pair) return false;
+    TrimLoop& loop = surface_.loops[static_cast<std::size_t>(contact.loop_a)];
+    const auto [first, second] = *pair;
+    TrimCurve &a = loop.curves[static_cast<std::size_t>(first)], &b = loop.curves[static_cast<std::size_t>(second)];
+    const std::optional<Eigen::Vector2d> at = crossing_parameters(a.curve, b.curve, contact.uv);
+    if (!at) return false;
+    const Interval tip_a =
+        a.reversed ? Interval{a.curve.domain().min, at->x()} : Interval{at->x(), a.curve.domain().max};
+    const Interval tip_b =
+        b.reversed ? Interval{at->y(), b.curve.domain().max} : Interval{b.curve.domain().min, at->y()};
+    if (!(tip_a.length() > 0 && tip_b.length() > 0 && tip_a.length() < a.curve.domain().length() &&
+          tip_b.length() < b.curve.domain().length()))
+      return false;
+    const double width = tip_width(a.curve, tip_a, b.curve, tip_b);
+    if (!(width <= 10 * surface_.resolution)) return false;
+    Vector2d x = a.curve(at->x());
+    // A line of constant u or v stays one.
+    for (const TrimCurve* c : {&a, &b})
+      for (int axis = 0; axis < 2; ++axis)
+        if (const auto row = c->curve.points().row(axis).array(); (row == row(0)).all()) x[axis] = row(0);
+    const std::string what = "curves " + std::to_string(a.index) + " and " + std::to_string(b.index) +
+                             " cross before they meet; the tip beyond, " + text(width) + " wide, is cut off";
+    keep(a, a.reversed ? Interval{at->x(), a.curve.domain().max} : Interval{a.curve.domain().min, at->x()}, a.reversed,
+         x);
+    keep(b, b.reversed ? Interval{b.curve.domain().min, at->y()} : Interval{at->y(), b.curve.domain().max}, !b.reversed,
+         x);
+    repairs_.push_back({loop.index, what, 0, x});
+    return true;
+  }
+
+  // The parameters of two curves where they cross, near to a place.
+  static std::optional<Eigen::Vector2d> crossing_parameters(const Curve2& a, const Curve2& b, const Vector2d& near) {
+    Eigen::Vector2d t(closest_point(a, near).t, closest_point(b, near).t);
+    for (int k = 0; k < 20; ++k) {
+      const auto ja = evaluate(a, t.x()), jb = evaluate(b, t.y());
+      Eigen::Matrix2d m;
+      m << ja.d1, -jb.d1;
+      const Eigen::Vector2d step = m.fullPivLu().solve(jb.x - ja.x);
+      if (!step.allFinite()) return std::nullopt;
+      t += step;
+      t = {std::clamp(t.x(), a.domain().min, a.domain().max), std::clamp(t.y(), b.domain().min, b.domain().max)};
+      if (step.norm() <= 1e-15 * t.norm()) break;
+    }
+    return t;
+  }
+
+  // Width in space of what lies between two stretches of curves: the largest distance across it.
+  double tip_width(const Curve2& a, const Interval& of_a, const Curve2& b, const Interval& of_b) const {
+    constexpr int places = 16;
+    const Curve2 other = sub_curve(b, of_b);
+    double width = 0;
+    for (int k = 1; k < places; ++k) {
+      const Vector2d x = a(of_a.min + of_a.length() * k / places), y = closest_point(other, x).x;
+      width = std::max(width, distance(x, y));
+    }
+    return width;
+  }
+
+  // A stretch of a curve, of which one end is put where the other curve's is.
+  static void keep(TrimCurve& c, const Interval& range, bool start, const Vector2d& end) {
+    Curve2 part = sub_curve(c.curve, range);
+    Curve2::Points points = part.points();
+    points.col(start ? 0 : points.cols() - 1) = end;
+    c.curve = Curve2(part.knots(), std::move(points), part.weights());
+    c.model.reset();
   }
 
   // Loops that cross or run along each other become loops that do neither.

@@ -169,6 +169,58 @@ TEST(LoopValidation, ACuspOfRoundedNumbersIsNoCrossing) {
 }
 
 // Leaves by 3e-28 near its start: no double between two samples shows it.
+// A cubic that comes to (3, 3) along the line x = 3 and, by `beyond`, from its far side; then back along that line.
+TrimmedSurface cusp(double beyond, double resolution) {
+  TrimmedSurface face =
+      trimmed(unit_cells(4),
+              {loop_of({bezier_curve({{1, 1}, {2.5, 1}, {3 + beyond, 2}, {3, 3}}), line_segment<2>({3, 3}, {3, 0.5}),
+                        line_segment<2>({3, 0.5}, {1, 0.5}), line_segment<2>({1, 0.5}, {1, 1})})});
+  face.resolution = resolution;
+  return face;
+}
+
+TEST(LoopValidation, ATipBeyondACrossingOfNeighboursIsCutOff) {
+  for (const double beyond : {1e-3, 1e-2, 3e-2}) {
+    SCOPED_TRACE(beyond);
+    // With s = 1 - t the cubic lies 3 - x = s (2 s^2 + 1.5 s (1 - s) - 3 beyond (1 - s)^2) from the line.
+    const double a = 0.5 - 3 * beyond, b = 1.5 + 6 * beyond, c = -3 * beyond;
+    const double s = (-b + std::sqrt(b * b - 4 * a * c)) / (2 * a), t = 1 - s;
+    TrimmedSurface face = cusp(beyond, beyond * beyond);
+    const auto repairs = validate_loops(face);
+    ASSERT_EQ(face.loops.size(), 1u);
+    ASSERT_EQ(face.loops[0].curves.size(), 4u);
+    EXPECT_TRUE(reports(repairs, "the tip beyond"));
+    const auto cubic = std::ranges::find(face.loops[0].curves, 0, &TrimCurve::index);
+    EXPECT_NEAR(cubic->curve.domain().max, t, 1e-9);
+    EXPECT_EQ(cubic->curve.points()(0, 3), 3);  // bitwise on the line
+    const Curve2 whole = bezier_curve({{1, 1}, {2.5, 1}, {3 + beyond, 2}, {3, 3}});
+    EXPECT_NEAR(cubic->curve.end().y(), whole(t).y(), 1e-9);
+    expect_laws(face, trace_trims(face));
+    // No wider than that.
+    expect_error(cusp(beyond, 0.01 * beyond * beyond), {"crosses"});
+  }
+}
+
+// An edge of constant v, and back beside it a spline whose first leg lies on it but for rounding: next to their joint
+// they cross. (Inches, as a public file has them.)
+TEST(LoopValidation, ACuspOnALevelEdgeIsNoCrossing) {
+  Curve2::Points points(2, 10);
+  points << 0.34231899982844, 0.343953138816291, 0.345881217468119, 0.348844890910404, 0.350421657488232,
+      0.35261153191199, 0.353633248209765, 0.354782017913083, 0.355131797720779, 0.355131797720779, 0,
+      1.6960641916319e-15, -0.00035763591247111, -0.00152888656649212, -0.00252132860630046, -0.00461355854379018,
+      -0.00606052606208017, -0.00872045392518006, -0.0103897408019426, -0.0118110236220473;
+  const double a = 0.139956574171473, b = 0.152408713258907, c = 0.164239385364182, d = 0.175487347396243,
+               e = 0.186317522485449;
+  const Curve2 back(KnotVector(3, {a, a, a, a, b, b, c, c, d, d, e, e, e, e}), points);
+  TrimmedSurface face = trimmed(
+      knot_plane({0.3, 0.4}, {-0.05, 0.05}),
+      {loop_of({line_segment<2>({0.344514098097419, 0}, {0.342318999828425, 0}), back,
+                line_segment<2>({0.355131797720779, -0.0118110236220473}, {0.36, -0.0118}),
+                line_segment<2>({0.36, -0.0118}, {0.36, 0}), line_segment<2>({0.36, 0}, {0.344514098097419, 0})})});
+  validate_loops(face);
+  expect_laws(face, trace_trims(face));
+}
+
 TEST(LoopValidation, MovesAnExcursionIntoTheDomainThatNoSampleShows) {
   TrimmedSurface face =
       with_outline(loop_of({bezier_curve({{1, 0}, {2, -1e-14}, {2.5, 2}, {3, 0}}), line_segment<2>({3, 0}, {3, 4}),
