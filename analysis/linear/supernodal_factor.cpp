@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "analysis/linear/supernodal_factor.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <queue>
 #include <utility>
 
+#include "analysis/linear/dense_kernels.h"
 #include "analysis/linear/pack.h"
 
 namespace toile {
 namespace {
 
 constexpr int group_count = 4;
-constexpr int together = 4;      // columns of a supernode in a solve, so that its rows are read a quarter as often
-constexpr int block = 32;        // columns of an update that one thread works out
-constexpr int wide = 2 * block;  // updates from here on are shared out
-
-using Dense = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+constexpr int together = 4;  // columns of a supernode in a solve, so that its rows are read a quarter as often
+constexpr int wide = 64;     // updates from here on are shared out
 
 // Which group each supernode belongs to, -1: the top. Heavy subtrees are parted into their root, which goes to the top,
 // and what hangs on it; then the heaviest goes to the group that has least.
@@ -73,7 +70,7 @@ SupernodalFactor::SupernodalFactor(const SupernodalShape& shape, std::span<const
     weight.push_back(static_cast<double>(node.columns) * node.rows);
     nodes_.push_back(std::move(node));
   }
-  factor_.resize(static_cast<std::size_t>(size));
+  factor_.resize(static_cast<std::size_t>(size) + overread);
   const auto rows_of = [&](const Node& node) {
     return std::span<const int>(row_).subspan(static_cast<std::size_t>(node.first_row), node.rows);
   };
@@ -148,8 +145,8 @@ void SupernodalFactor::lay_out_stack(Part& part) {
     largest = std::max(largest, static_cast<std::size_t>(size(node)));
     longest = std::max(longest, static_cast<std::size_t>(node.rows));
   }
-  part.stack.resize(static_cast<std::size_t>(most));
-  part.front.resize(largest);
+  part.stack.resize(static_cast<std::size_t>(most) + overread);
+  part.front.resize(largest + overread);
   part.column.resize(longest);
 }
 
@@ -172,27 +169,22 @@ bool SupernodalFactor::eliminate(Part& part, Node& node, std::span<const double>
   std::fill_n(own, static_cast<std::ptrdiff_t>(node.columns) * node.rows, 0.0);
   for (std::ptrdiff_t k = node.first_entry; k < node.first_entry + node.entries; ++k)
     factor_[entries_[k].place] += values[entries_[k].value];
-  std::fill_n(part.front.data(), static_cast<std::ptrdiff_t>(below) * below, 0.0);
+  for (int c = 0; c < below; ++c)  // the lower triangle
+    std::fill_n(part.front.data() + static_cast<std::ptrdiff_t>(c) * below + c, below - c, 0.0);
   for (const int child : node.children) add_update(nodes_[child], node, part.front.data());
 
-  Dense diagonal(own, node.columns, node.columns, Eigen::OuterStride<>(node.rows));
-  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>> llt(diagonal);
-  for (int k = 0; k < node.columns; ++k)
-    if (!(diagonal(k, k) > 0)) return false;
-  if (llt.info() != Eigen::Success) return false;
-  if (below == 0) return true;
-  Dense under(own + node.columns, below, node.columns, Eigen::OuterStride<>(node.rows));
-  Dense update(part.front.data(), below, below, Eigen::OuterStride<>(below));
-  diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(under);
-  const int blocks = (below + block - 1) / block;
+  if (!factorise_columns(own, node.rows, node.rows, node.columns)) return false;
+  const double* const under = own + node.columns;
+  double* const update = part.stack.data() + node.update;
+  const int blocks = (below + tile_columns - 1) / tile_columns;
   share_out(below >= wide ? workers : nullptr, blocks, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
-      const int from = block * k, width = std::min(block, below - from), left = below - from;
-      update.block(from, from, left, width).noalias() -=
-          under.bottomRows(left) * under.middleRows(from, width).transpose();
+      const int from = tile_columns * k;
+      const std::ptrdiff_t corner = static_cast<std::ptrdiff_t>(from) * below + from;
+      minus_product(part.front.data() + corner, update + corner, below, below, under + from, under + from, node.rows,
+                    node.columns, below - from, std::min(tile_columns, below - from));
     }
   });
-  std::copy_n(part.front.data(), static_cast<std::ptrdiff_t>(below) * below, part.stack.data() + node.update);
   return true;
 }
 
