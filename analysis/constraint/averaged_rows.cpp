@@ -58,7 +58,7 @@ std::vector<StrainRow> cell_averages(const Body& body, int index) {
     middle /= area;
     for (int d : {0, 1}) {
       const double length = apply(sums[d].over(1), body.rest()).norm();
-      rows.push_back({sums[d].over(length), index, -1, d == 1, area, 0, 0, middle, Eigen::Vector2d::Unit(d)});
+      rows.push_back({sums[d].over(length), index, -1, d == 1, area, 0, middle, Eigen::Vector2d::Unit(d)});
     }
   }
   return rows;
@@ -98,8 +98,7 @@ std::vector<StrainRow> springs(const Body& body, int index, const TrimTopology& 
       thread[d] = apply(tangent.over(1), body.rest()).dot(along);
     }
     thread.normalize();
-    rows.push_back(
-        {sum.over(length), index, -1, std::abs(thread[1]) > std::abs(thread[0]), area, 0, 0, middle, thread});
+    rows.push_back({sum.over(length), index, -1, std::abs(thread[1]) > std::abs(thread[0]), area, 0, middle, thread});
   };
   for (int j = 0; j <= nv - (closure.v ? 1 : 0); ++j)
     for (int i = 0; i < nu; ++i) add(i, j, i + 1, j, 0.5 * (cloth_of(i, j - 1) + cloth_of(i, j)));

@@ -41,8 +41,8 @@ std::vector<StrainRow> strain_rows(const Body& body, const AffineMap& map,
       if (!point.used) continue;
       const MaterialPoint functions = body.material_point(panel, point.u, point.v);
       const Eigen::Vector2d uv(point.u, point.v);
-      rows.push_back({make_row(functions, 1), panel, k, false, 0, 0, 0, uv, {1, 0}});
-      rows.push_back({make_row(functions, 2), panel, k, true, 0, 0, 0, uv, {0, 1}});
+      rows.push_back({make_row(functions, 1), panel, k, false, 0, 0, uv, {1, 0}});
+      rows.push_back({make_row(functions, 2), panel, k, true, 0, 0, uv, {0, 1}});
       values.insert(values.end(), 2, make_row(functions, 0));
     }
   weigh_rows(body, map, values, rows);

@@ -22,8 +22,7 @@ struct StrainRow {
   int point = 0;  // in the panel's constraint points; -1: the row is a mean, of no point
   bool warp = false;
   double area = 0;               // m2, of the cloth that the row represents
-  double stiffness = 0;          // N m, force per strain times area; 0: hard
-  double damping_rate = 0;       // 1/s, with a stiffness: see FastProjection::step
+  double stiffness = 0;          // N m, force per strain times area, of the limit's law; 0: hard
   Eigen::Vector2d uv{0, 0};      // where it stands on the panel
   Eigen::Vector2d thread{1, 0};  // unit, in weft and warp: the direction whose strain C is; `warp` says the nearer
 };

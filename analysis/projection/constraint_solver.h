@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a time step asks of whatever meets its constraints: FastProjection or LagrangeNewton.
+// What a time step asks of whatever meets its constraints: PrimalDual, FastProjection or LagrangeNewton.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,13 +18,12 @@ struct ProjectionReport {
   int iterations = 0;
   double strain_violation = 0;  // at the end: largest |C|, with slack in the band what C lies outside of it
   double place_violation = 0;   // m
-  // Of rows with a stiffness the largest |C - law(lambda)|, over the band. By the Lagrange Newton the part of the
-  // correction that is no constraint force: |M (x - candidate) + J^T lambda| over |M (x - candidate)|, weighted by
-  // M^-1.
+  // Of rows with a law the largest |C - law(lambda)|, over the limit. By the Lagrange Newton the part of the correction
+  // that is no constraint force: |M (x - candidate) + J^T lambda| over |M (x - candidate)|, weighted by M^-1.
   double residual = 0;
-  bool damped = false;  // the method asked for found no solution: the candidate's gradients led there, which damps
-  int worst_row = -1;   // strain row with the largest violation
-  double energy = 0;    // J, of the limit laws at the end
+  bool damped = false;        // the Lagrange Newton found no solution: projected instead, which damps
+  int worst_row = -1;         // strain row with the largest violation
+  double energy = 0;          // J, of the limit laws at the end
   double factor_seconds = 0;  // wall time of the numeric factorisations
   double solve_seconds = 0;   // and of the solutions by them
 };
@@ -32,10 +31,10 @@ void fields(auto& archive, Like<ProjectionReport> auto& r) {
   archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);
 }
 
-// Constraint forces of the steps before: what the next step needs to be of second order. Empty where there were none.
+// Constraint forces at one time: where a solver goes on from. Empty where there were none.
 struct ConstraintForces {
-  Eigen::Matrix3Xd strain;  // N m, per strain row: at the start of the step, one and two steps before
-  Eigen::Matrix3Xd place;   // N, per place row at the start: a first guess only
+  Eigen::VectorXd strain;  // N m, per strain row
+  Eigen::Matrix3Xd place;  // N, per place row
 };
 void fields(auto& archive, Like<ConstraintForces> auto& f) {
   archive(f.strain, f.place);
@@ -60,14 +59,21 @@ class ConstraintSolver {
 
   // Corrects x (free nodes) at time t onto the constraints, all rows hard.
   virtual ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) = 0;
-  // The same for the candidate x of a step from the state `start` at t - dt; `forces` at its start become those at t,
-  // unless the solver needs none.
-  virtual ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>& start,
-                                double dt, ConstraintForces& forces) = 0;
+  // The same for the candidate of a step from the places `start` at t - dt: x and v are where the cloth would be
+  // without constraints under the acceleration a of the start, x0 + dt v0 + dt^2/2 a and v0 + dt a. `forces` at its
+  // start become those at t, unless the solver needs none.
+  virtual ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                                const Eigen::Ref<const Eigen::VectorXd>& start, double dt,
+                                ConstraintForces& forces) = 0;
+  // Whether v then has all of the constraints' impulse, so that cloth at rest has v = 0; else it has what moves the
+  // candidate, over dt: half of it.
+  virtual bool end_velocity() const { return false; }
+  // Once v is whole, with the cloth's own forces at t too: takes out of it what the next step can't resolve.
+  virtual void settle(Eigen::Ref<Eigen::VectorXd>, double) {}
   // How far x is from the constraints, nothing moved.
   virtual ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) = 0;
   // Energy [J] that the constraints store at x; 0 where they are hard.
-  virtual double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) = 0;
+  virtual double energy(const Eigen::Ref<const Eigen::VectorXd>&, double) { return 0; }
 
   // Multipliers of the last step, per row [kg m2 for strain rows, kg m for place rows]: divided by dt^2 they are the
   // constraint forces' quadrature weights [N m, N].

@@ -18,24 +18,13 @@ namespace {
 
 constexpr int patience = 15;         // iterations without gain before giving up; dependent rows make pauses of up to 10
 constexpr double least_gain = 0.99;  // a violation above this times the best so far is no gain
-constexpr double poor_gain = 0.25;   // an iteration that leaves more than this of the residual asks for a new factor
-constexpr double no_gain = 0.5;      // more than this left: the directions at hand no longer lead there
-constexpr double damped_residual = 0.1;  // what damps anyway needn't be exact
-// The next step corrects the remaining violation, adding a velocity of violation / dt: what is allowed falls with dt,
-// but not below rounding.
-constexpr double least_exactness = 1e-6;
 constexpr double shortest_tangent = 1e-4;  // |y| below which a collapsed tangent is scaled as if it were this long
-
-// Of the law's forces at the end of a step, at its start, one and two steps before: see `step`.
-Eigen::Vector4d force_weights(double damping) {
-  return damping * Eigen::Vector4d::Unit(0) + (1 - damping) / 27 * Eigen::Vector4d(8, 12, 6, 1);
-}
 
 }  // namespace
 
 // The worst of some strain rows.
 struct Violation {
-  double violation = 0, residual = 0;
+  double violation = 0;
   int row = -1;
   void take(double v, int r) {
     if (!(v <= violation) && !std::isnan(violation)) violation = v, row = r;  // NaN counts as worst
@@ -50,27 +39,19 @@ struct FastProjection::Impl {
   ConstraintRows rows;
   ProjectionOptions options;
   ComposedRows composed;
-  CompressedRows at_node;  // M^-1 D^T
-  // Of `rows`, close together, as every iteration reads them.
-  std::vector<char> warp;
-  std::vector<double> stiffness, damping_rate;
-  double least_damping_rate = std::numeric_limits<double>::infinity();  // of rows with a law that damps
-  std::vector<double> gram_diagonal;                                    // per scalar row; 0: takes no part
-  std::vector<int> system_scalar;                                       // scalar row of each system row
+  CompressedRows at_node;             // M^-1 D^T
+  std::vector<double> gram_diagonal;  // per scalar row; 0: takes no part
+  std::vector<int> system_scalar;     // scalar row of each system row
   SparsePattern pattern;
   std::vector<double> gram, values;  // per entry of the pattern
   std::unique_ptr<Cholesky> factor;
   Workers* workers = nullptr;  // null: one thread
 
-  Eigen::Matrix3Xd y, tangents, direction, targets, fixed_places;  // direction: scaled, per system row
-  Eigen::VectorXd scale, residual, rhs, solution, candidate;
-  Eigen::VectorXd strain_lambda, compliance;  // compliance 0: hard
-  double exactness = 1;                       // of the residuals that are allowed in a step, see `step`
-  Eigen::VectorXd share;                      // of the force at the end in what acts in a step
-  std::vector<char> slack;                    // within the band without a force: takes no part for now
+  Eigen::Matrix3Xd y, direction, targets, fixed_places;  // direction: scaled, per system row
+  Eigen::VectorXd scale, residual, rhs, solution;
+  Eigen::VectorXd strain_lambda;
   Eigen::Matrix3Xd place_lambda, strain_impulse;
-  Eigen::Matrix3Xd impulse;    // per scalar row, of one push
-  Eigen::VectorXd row_energy;  // per strain row
+  Eigen::Matrix3Xd impulse;  // per scalar row, of one push
   std::vector<Violation> worst_of_piece;
 
   Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
@@ -79,23 +60,8 @@ struct FastProjection::Impl {
   int strains() const { return static_cast<int>(rows.strain.size()); }
   int places() const { return static_cast<int>(rows.place.size()); }
   int size() const { return strains() + 3 * places(); }
-  const StrainBand& band(int r) const { return warp[r] ? options.warp : options.weft; }
   bool takes_part(int r) const { return gram_diagonal[r] > 0; }
-  bool has_law(int r) const { return takes_part(r) && stiffness[r] > 0; }
-  bool soft(int r) const { return compliance[r] > 0; }
-  LimitLaw law(int r) const { return {band(r), compliance[r]}; }
-  // The law of a row in forces instead of a step's multipliers.
-  LimitLaw force_law(int r) const { return {band(r), 1 / stiffness[r]}; }
   double strain(const Eigen::Matrix3Xd& tangent, int r) const { return 0.5 * (tangent.col(r).squaredNorm() - 1); }
-  double limit_energy() {
-    share_out(strains(), [&](int begin, int end) {
-      for (int r = begin; r < end; ++r) row_energy[r] = has_law(r) ? force_law(r).energy(strain(y, r)) : 0;
-    });
-    double sum = 0;
-    for (const double energy : row_energy) sum += energy;
-    return sum;
-  }
-
   template <class Body>
   void share_out(int count, const Body& body) {
     toile::share_out(workers, count, body);
@@ -103,18 +69,13 @@ struct FastProjection::Impl {
 
   void build(const Eigen::VectorXd& node_mass);
   void begin(double t);
-  void clear();
-  void complete(ConstraintForces& forces) const;
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   Violation measure_strain(int begin, int end);
   void point_along(const Eigen::Matrix3Xd& tangents);
   bool factorise(ProjectionReport& report);
   void correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   void push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen::VectorXd> x);
-  // Where the rows point while iterating: as they do, giving up where that gains nothing; along the candidate's
-  // gradients, renewed where that gains nothing; or along those of each iteration.
-  enum class Directions { start, candidate, renewed };
-  ProjectionReport iterate(Eigen::Ref<Eigen::VectorXd> x, Directions directions);
+  ProjectionReport iterate(Eigen::Ref<Eigen::VectorXd> x);
 };
 
 void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
@@ -124,18 +85,11 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
       throw SolverError("projection: control point " + std::to_string(map.node_control_point()[k]) + " has no mass");
 
   at_node = transposed_by_mass(composed.free, node_mass);
-  for (const StrainRow& row : rows.strain) {
-    warp.push_back(row.warp);
-    stiffness.push_back(row.stiffness);
-    damping_rate.push_back(row.damping_rate);
-  }
 
   const GramMatrix scalar = gram_matrix(composed.free, node_mass);
   const int scalars = strains() + places();
   gram_diagonal.resize(scalars);
   for (int r = 0; r < scalars; ++r) gram_diagonal[r] = scalar.value[scalar.pattern.column_start[r]];
-  for (int r = 0; r < strains(); ++r)
-    if (has_law(r) && damping_rate[r] > 0) least_damping_rate = std::min(least_damping_rate, damping_rate[r]);
   for (int p = 0; p < places(); ++p)
     if (!(gram_diagonal[strains() + p] > 0))
       throw SolverError("pin " + std::to_string(rows.place[p].pin) +
@@ -165,7 +119,6 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   if (size() > 0) factor = std::make_unique<Cholesky>(pattern);
 
   y.resize(3, scalars);
-  tangents.resize(3, scalars);
   direction.resize(3, size());
   targets.resize(3, places());
   scale.resize(size());
@@ -173,59 +126,26 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   rhs.resize(size());
   solution.resize(size());
   strain_lambda = Eigen::VectorXd::Zero(strains());
-  compliance = Eigen::VectorXd::Zero(strains());
-  share = Eigen::VectorXd::Ones(strains());
-  slack.assign(strains(), 0);
   place_lambda = Eigen::Matrix3Xd::Zero(3, places());
   strain_impulse = Eigen::Matrix3Xd::Zero(3, strains());
   impulse.resize(3, scalars);
-  row_energy.resize(strains());
   worst_of_piece.resize(static_cast<std::size_t>(pieces(strains())));
 }
 
 void FastProjection::Impl::begin(double t) {
   map.fixed_places(t, fixed_places);
   for (int p = 0; p < places(); ++p) targets.col(p) = rows.place[p].target(t);
-  compliance.setZero();
-  exactness = 1;
-  clear();
-}
-
-void FastProjection::Impl::clear() {
   strain_lambda.setZero();
   place_lambda.setZero();
   strain_impulse.setZero();
-}
-
-// Where nothing came before, what the strains at the start stand for.
-void FastProjection::Impl::complete(ConstraintForces& forces) const {
-  if (forces.strain.cols() != strains()) {
-    forces.strain.setZero(3, strains());
-    for (int r = 0; r < strains(); ++r)
-      if (has_law(r)) forces.strain.col(r).setConstant(force_law(r).multiplier(strain(tangents, r)));
-  }
-  if (forces.place.cols() != places()) forces.place.setZero(3, places());
 }
 
 // Violation and residual of strain rows, at y.
 Violation FastProjection::Impl::measure_strain(int begin, int end) {
   Violation worst;
   for (int r = begin; r < end; ++r) {
-    slack[r] = 0;
-    residual[r] = 0;
-    if (!takes_part(r)) continue;
-    const double C = strain(y, r);
-    double violation = std::abs(C);
-    residual[r] = C;
-    if (soft(r)) {
-      const StrainBand& b = band(r);
-      if (b.slack > 0) violation = std::max({C - b.stretch, -b.compress - C, 0.0});
-      slack[r] = b.slack > 0 && strain_lambda[r] == 0 && law(r).slack_at(C);
-      const double lambda = strain_lambda[r] != 0 ? strain_lambda[r] : std::copysign(0.0, C);
-      residual[r] = slack[r] ? 0 : C - law(r).strain(lambda);
-      worst.residual = std::max(worst.residual, std::abs(residual[r]) / std::min(b.stretch, b.compress));
-    }
-    worst.take(violation, r);
+    residual[r] = takes_part(r) ? strain(y, r) : 0;
+    if (takes_part(r)) worst.take(std::abs(residual[r]), r);
   }
   return worst;
 }
@@ -236,14 +156,10 @@ void FastProjection::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
     worst_of_piece[static_cast<std::size_t>(index)] = measure_strain(begin, end);
   });
   Violation worst;
-  for (const Violation& piece : worst_of_piece) {
-    worst.take(piece.violation, piece.row);
-    worst.residual = std::max(worst.residual, piece.residual);
-  }
+  for (const Violation& piece : worst_of_piece) worst.take(piece.violation, piece.row);
   report.strain_violation = worst.violation;
   report.worst_row = worst.row;
-  report.residual = worst.residual;
-  report.place_violation = report.energy = 0;
+  report.place_violation = 0;
   evaluate(composed, x, fixed_places, strains(), strains() + places(), y);
   for (int p = 0; p < places(); ++p) {
     const Eigen::Vector3d gap = y.col(strains() + p) - targets.col(p);
@@ -272,12 +188,11 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
   const double* t = direction.data();
   share_out(size(), [&](int begin, int end) {
     for (int c = begin; c < end; ++c) {
-      const bool idle = c < strains() && slack[c];
       const double t0 = t[3 * c], t1 = t[3 * c + 1], t2 = t[3 * c + 2];
       for (int e = pattern.column_start[c]; e < pattern.column_start[c + 1]; ++e) {
         const int r = pattern.row[e];
         const double* s = t + 3 * r;
-        values[e] = idle || (r < strains() && slack[r]) ? 0 : gram[e] * (s[0] * t0 + s[1] * t1 + s[2] * t2);
+        values[e] = gram[e] * (s[0] * t0 + s[1] * t1 + s[2] * t2);
       }
     }
   });
@@ -286,12 +201,8 @@ bool FastProjection::Impl::factorise(ProjectionReport& report) {
   double strain_softness = options.regularisation, place_softness = 0;
   for (int attempt = 0; attempt < 4; ++attempt) {
     share_out(size(), [&](int begin, int end) {
-      for (int i = begin; i < end; ++i) {
-        double softness = i < strains() ? strain_softness : place_softness;
-        if (i < strains() && soft(i))
-          softness = std::max(softness, law(i).slope(strain_lambda[i]) * scale[i] * scale[i]);
-        values[pattern.column_start[i]] = 1 + softness;
-      }
+      for (int i = begin; i < end; ++i)
+        values[pattern.column_start[i]] = 1 + (i < strains() ? strain_softness : place_softness);
     });
     const Clock::time_point start = Clock::now();
     const bool positive = factor->factorise(values);
@@ -339,50 +250,27 @@ void FastProjection::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionRepo
   const Clock::time_point start = Clock::now();
   factor->solve(rhs, solution);
   report.solve_seconds += since(start);
-  // A row with slack can't change sides within an iteration: it lets go first.
-  if (options.weft.slack > 0 || options.warp.slack > 0) {
-    for (int r = 0; r < strains(); ++r)
-      if (soft(r) && band(r).slack > 0) {
-        const double after = strain_lambda[r] + scale[r] * solution[r];
-        const double side = strain_lambda[r] != 0 ? strain_lambda[r] : residual[r];
-        if (slack[r] || after * side < 0) solution[r] = scale[r] > 0 ? -strain_lambda[r] / scale[r] : 0;
-      }
-  }
   push(solution, x);
 }
 
-ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, Directions directions) {
+ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x) {
   ProjectionReport report;
-  double best = std::numeric_limits<double>::infinity(), last = best;
+  double best = std::numeric_limits<double>::infinity();
   int waited = 0;
-  bool factored = false;
   while (true) {
     measure(x, report);
-    const double excess = std::max(
-        {report.strain_violation / std::max(options.tolerance, 1e-30),
-         report.place_violation / std::max(options.place_tolerance, 1e-30),
-         report.residual / (exactness * (directions == Directions::start ? options.residual : damped_residual))});
-    if (size() == 0 || (report.converged && excess <= 1 && report.iterations >= options.min_iterations)) break;
-    if (report.iterations >= options.max_iterations) break;
-    if (!std::isfinite(excess)) break;
+    const double excess = std::max(report.strain_violation / std::max(options.tolerance, 1e-30),
+                                   report.place_violation / std::max(options.place_tolerance, 1e-30));
+    if (size() == 0 || (report.converged && report.iterations >= options.min_iterations)) break;
+    if (report.iterations >= options.max_iterations || !std::isfinite(excess)) break;
     waited = excess < least_gain * best ? 0 : waited + 1;
     best = std::min(best, excess);
     if (waited >= patience) break;
-    const bool gained = excess <= no_gain * last;
-    if (directions == Directions::start && !gained) break;
-    if (directions == Directions::renewed || (directions == Directions::candidate && (!factored || !gained))) {
-      point_along(y);
-      factored = false;
-    }
-    if (!factored || excess > poor_gain * last) {
-      if (!factorise(report)) break;
-      factored = true;
-    }
-    last = excess;
+    point_along(y);
+    if (!factorise(report)) break;
     correct(x, report);
     ++report.iterations;
   }
-  report.energy = limit_energy();
   return report;
 }
 
@@ -397,68 +285,14 @@ FastProjection& FastProjection::operator=(FastProjection&&) noexcept = default;
 
 ProjectionReport FastProjection::project(Eigen::Ref<Eigen::VectorXd> x, double t) {
   impl_->begin(t);
-  return impl_->iterate(x, Impl::Directions::renewed);
+  return impl_->iterate(x);
 }
 
-ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, double t,
-                                      const Eigen::Ref<const Eigen::VectorXd>& start, double dt,
-                                      ConstraintForces& forces) {
-  Impl& s = *impl_;
-  if (s.options.variant == ProjectionVariant::paper) return project(x, t);
-  s.map.fixed_places(t - dt, s.fixed_places);
-  s.share_out(s.strains() + s.places(),
-              [&](int begin, int end) { evaluate(s.composed, start, s.fixed_places, begin, end, s.tangents); });
-  s.begin(t);
-  s.point_along(s.tangents);
-  s.complete(forces);
-  const double dt2 = dt * dt;
-  s.exactness = std::clamp(s.least_damping_rate * dt, least_exactness, 1.0);
-  s.candidate = x;
-  // What the steps before are owed, and as a first guess that the forces stay as they are. Multipliers are what the
-  // end of the step adds.
-  s.share_out(s.strains(), [&](int begin, int end) {
-    for (int r = begin; r < end; ++r) {
-      s.rhs[r] = 0;
-      if (!s.has_law(r)) continue;
-      Eigen::Vector4d weights = force_weights(std::min(1.0, dt * s.damping_rate[r]));
-      s.share[r] = weights[0];
-      s.compliance[r] = 1 / (s.share[r] * s.stiffness[r] * dt2);
-      weights[1] += weights[0];
-      s.rhs[r] = dt2 * weights.tail<3>().dot(forces.strain.col(r)) / s.scale[r];
-    }
-  });
-  for (int i = s.strains(); i < s.size(); ++i)
-    s.rhs[i] = dt2 * forces.place((i - s.strains()) % 3, (i - s.strains()) / 3) / s.scale[i];
-  s.push(s.rhs, x);
-  s.share_out(s.strains(), [&](int begin, int end) {
-    for (int r = begin; r < end; ++r) s.strain_lambda[r] = s.soft(r) ? s.share[r] * dt2 * forces.strain(0, r) : 0;
-  });
-  ProjectionReport report = s.iterate(x, Impl::Directions::start);
-  if (!report.converged || report.residual > s.exactness * s.options.residual) {
-    // From no force on.
-    x = s.candidate;
-    s.clear();
-    s.compliance = s.compliance.cwiseProduct(s.share);
-    s.share.setOnes();
-    const ProjectionReport again = s.iterate(x, Impl::Directions::candidate);
-    const int iterations = report.iterations + again.iterations;
-    const double factor_seconds = report.factor_seconds + again.factor_seconds;
-    const double solve_seconds = report.solve_seconds + again.solve_seconds;
-    report = again;
-    report.damped = true;
-    report.iterations = iterations;
-    report.factor_seconds = factor_seconds;
-    report.solve_seconds = solve_seconds;
-  }
-  s.share_out(s.strains(), [&](int begin, int end) {
-    for (int r = begin; r < end; ++r) {
-      s.strain_lambda[r] /= s.share[r];
-      forces.strain(2, r) = forces.strain(1, r);
-      forces.strain(1, r) = forces.strain(0, r);
-      forces.strain(0, r) = s.strain_lambda[r] / dt2;
-    }
-  });
-  forces.place = s.place_lambda / dt2;
+ProjectionReport FastProjection::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                                      const Eigen::Ref<const Eigen::VectorXd>&, double dt, ConstraintForces&) {
+  v -= x / dt;
+  const ProjectionReport report = project(x, t);
+  v += x / dt;
   return report;
 }
 
@@ -472,14 +306,6 @@ ProjectionReport FastProjection::measure(const Eigen::Ref<const Eigen::VectorXd>
   impl_->begin(t);
   impl_->measure(x, report);
   return report;
-}
-
-double FastProjection::energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
-  Impl& s = *impl_;
-  if (s.options.variant == ProjectionVariant::paper) return 0;
-  s.map.fixed_places(t, s.fixed_places);
-  evaluate(s.composed, x, s.fixed_places, s.y);
-  return s.limit_energy();
 }
 
 const Eigen::VectorXd& FastProjection::strain_multipliers() const {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "analysis/constraint/composed_rows.h"
-#include "analysis/linear/cholesky.h"
+#include "analysis/projection/row_matrix.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
 
@@ -21,45 +21,6 @@ constexpr double least_softness = 1e-8;  // of the diagonal of J M^-1 J^T: its i
 constexpr double rounding = 1e-14;       // of the places: a smaller correction has no direction
 constexpr double least_strain = 1e-3;    // of the tolerance: smaller violations are compared with this instead
 
-// Lower triangle of sum_r (d_r^T d_r) x B_r + diag(m) x I over nodes, B_r a symmetric 3 x 3 block.
-struct NodeBlocks {
-  SparsePattern pattern;
-  std::vector<int> below;  // of each pair of a row's entries (first <= second): how many blocks below the diagonal's
-
-  NodeBlocks(const CompressedRows& rows, int nodes) {
-    std::vector<std::vector<int>> near(nodes);  // itself and the nodes of larger number that a row has in common
-    for (int j = 0; j < nodes; ++j) near[j].push_back(j);
-    for_pairs(rows, [&](int first, int second) { near[first].push_back(second); });
-    pattern.column_start.push_back(0);
-    for (int j = 0; j < nodes; ++j) {
-      std::sort(near[j].begin(), near[j].end());
-      near[j].erase(std::unique(near[j].begin(), near[j].end()), near[j].end());
-      for (int b = 0; b < 3; ++b) {
-        for (const int i : near[j])
-          for (int a = i == j ? b : 0; a < 3; ++a) pattern.row.push_back(3 * i + a);
-        pattern.column_start.push_back(static_cast<int>(pattern.row.size()));
-      }
-    }
-    for_pairs(rows, [&](int first, int second) {
-      const auto place = std::lower_bound(near[first].begin(), near[first].end(), second);
-      below.push_back(static_cast<int>(place - near[first].begin()));
-    });
-  }
-
-  // visit(node, node of equal or larger number), row by row.
-  template <class Visit>
-  static void for_pairs(const CompressedRows& rows, Visit visit) {
-    for (int r = 0; r < rows.size(); ++r)
-      for (int p = rows.start[r]; p < rows.start[r + 1]; ++p)
-        for (int q = p; q < rows.start[r + 1]; ++q) visit(rows.column[p], rows.column[q]);
-  }
-
-  // Of values: column b of the block that many below the diagonal's, its row 0 (in the diagonal block, rows from b on).
-  double* column(std::vector<double>& values, int node, int lower, int b) const {
-    return values.data() + pattern.column_start[3 * node + b] + 3 * lower - b;
-  }
-};
-
 }  // namespace
 
 struct LagrangeNewton::Impl {
@@ -69,9 +30,7 @@ struct LagrangeNewton::Impl {
   ComposedRows composed;
   Eigen::VectorXd mass;           // per node
   Eigen::VectorXd gram_diagonal;  // of D M^-1 D^T, per scalar row; 0: takes no part
-  NodeBlocks blocks;
-  std::vector<double> values;
-  std::unique_ptr<Cholesky> factor;
+  RowMatrix matrix;
 
   Eigen::Matrix3Xd y, targets, fixed_places, gap;   // gap: of place rows
   Eigen::VectorXd softness;                         // S, per scalar row
@@ -89,8 +48,7 @@ struct LagrangeNewton::Impl {
         composed(compose(map, rows)),
         mass(node_mass),
         gram_diagonal(Eigen::VectorXd::Zero(composed.free.size())),
-        blocks(composed.free, map.nodes()),
-        values(blocks.pattern.row.size()),
+        matrix(composed.free, mass),
         y(3, size()),
         targets(3, places()),
         gap(3, places()),
@@ -115,7 +73,6 @@ struct LagrangeNewton::Impl {
       if (!(gram_diagonal[strains() + p] > 0))
         throw SolverError("pin " + std::to_string(rows.place[p].pin) +
                           " holds a point whose control points are all fixed by other pins: remove one of them");
-    if (mass.size() > 0) factor = std::make_unique<Cholesky>(blocks.pattern);
   }
 
   Eigen::VectorXd& lambda() { return memory.strain_multipliers; }
@@ -190,26 +147,12 @@ void LagrangeNewton::Impl::balance(const Eigen::Ref<const Eigen::VectorXd>& x, P
 
 // K + J^T S^-1 J at the present y and multipliers; without those of compression, it is positive.
 void LagrangeNewton::Impl::assemble(bool compression) {
-  std::fill(values.begin(), values.end(), 0.0);
-  for (int k = 0; k < mass.size(); ++k)
-    for (int a = 0; a < 3; ++a) blocks.column(values, k, 0, a)[a] = mass[k];
-  const CompressedRows& d = composed.free;
-  const int* below = blocks.below.data();
   for (int r = 0; r < size(); ++r) {
     if (gram_diagonal[r] == 0) continue;
-    Eigen::Matrix3d curvature = Eigen::Matrix3d::Identity() / softness[r];
-    if (r < strains()) {
-      curvature = y.col(r) * (y.col(r).transpose() / softness[r]);
-      curvature.diagonal().array() += compression ? lambda()[r] : std::max(lambda()[r], 0.0);
-    }
-    for (int p = d.start[r]; p < d.start[r + 1]; ++p)
-      for (int q = p; q < d.start[r + 1]; ++q, ++below) {
-        const double weight = d.value[p] * d.value[q];
-        for (int b = 0; b < 3; ++b) {
-          double* column = blocks.column(values, d.column[p], *below, b);
-          for (int a = p == q ? b : 0; a < 3; ++a) column[a] += weight * curvature(a, b);
-        }
-      }
+    const double slope = 1 / softness[r];
+    matrix.blocks[r] = r >= strains() ? SymmetricBlock{slope, slope, slope}
+                                      : SymmetricBlock::along(slope, y.col(r).data(),
+                                                              compression ? lambda()[r] : std::max(lambda()[r], 0.0));
   }
 }
 
@@ -218,7 +161,7 @@ bool LagrangeNewton::Impl::factorise(ProjectionReport& report) {
     if (attempt > 1) softness *= 10;
     assemble(attempt == 0);
     const Clock::time_point start = Clock::now();
-    const bool positive = factor->factorise(values);
+    const bool positive = matrix.factorise();
     report.factor_seconds += since(start);
     if (positive) return true;
   }
@@ -232,7 +175,7 @@ void LagrangeNewton::Impl::correct(Eigen::Ref<Eigen::VectorXd> x, ProjectionRepo
     if (gram_diagonal[r] > 0) spread(r, -missed[r] / softness[r] * y.col(r), rhs);
   for (int p = 0; p < places(); ++p) spread(strains() + p, -gap.col(p) / softness[strains() + p], rhs);
   const Clock::time_point start = Clock::now();
-  factor->solve(rhs, solution);
+  matrix.solve(rhs, solution);
   report.solve_seconds += since(start);
   x += solution;
   for (int r = 0; r < strains(); ++r)
@@ -302,9 +245,12 @@ ProjectionReport LagrangeNewton::project(Eigen::Ref<Eigen::VectorXd> x, double t
   return report;
 }
 
-ProjectionReport LagrangeNewton::step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>&,
-                                      double, ConstraintForces&) {
-  return project(x, t);
+ProjectionReport LagrangeNewton::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                                      const Eigen::Ref<const Eigen::VectorXd>&, double dt, ConstraintForces&) {
+  v -= x / dt;
+  const ProjectionReport report = project(x, t);
+  v += x / dt;
+  return report;
 }
 
 ProjectionReport LagrangeNewton::measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
@@ -314,9 +260,6 @@ ProjectionReport LagrangeNewton::measure(const Eigen::Ref<const Eigen::VectorXd>
   return report;
 }
 
-double LagrangeNewton::energy(const Eigen::Ref<const Eigen::VectorXd>&, double) {
-  return 0;
-}
 const Eigen::VectorXd& LagrangeNewton::strain_multipliers() const {
   return impl_->memory.strain_multipliers;
 }
@@ -339,7 +282,7 @@ bool LagrangeNewton::restore(const ProjectionMemory& memory) {
   return true;
 }
 void LagrangeNewton::use_threads(Workers* workers) {
-  if (impl_->factor) impl_->factor->use_threads(workers);
+  impl_->matrix.use_threads(workers);
   if (impl_->projection) impl_->projection->use_threads(workers);
   impl_->workers = workers;
 }
@@ -347,7 +290,7 @@ const ConstraintRows& LagrangeNewton::rows() const {
   return impl_->rows;
 }
 std::size_t LagrangeNewton::factor_nonzeros() const {
-  return impl_->factor ? impl_->factor->factor_nonzeros() : 0;
+  return impl_->matrix.factor_nonzeros();
 }
 
 }  // namespace toile

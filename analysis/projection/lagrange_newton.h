@@ -26,12 +26,11 @@ namespace toile {
 //   (2) the factor exists exactly where the step leads to a minimum. Where it doesn't (cloth that buckles under the
 //       multipliers of compression), K leaves out negative multipliers, then S grows.
 //   (3) Where Newton's method gains nothing in five iterations (buckling by a tenth in one step), the step is the
-//       projection's in the paper's variant, and `damped` says so.
+//       projection's, and `damped` says so.
 class LagrangeNewton final : public ConstraintSolver {
  public:
-  // Of the options `weft`, `warp` and `variant` don't matter; `residual` bounds ProjectionReport::residual; a
-  // `regularisation` below 1e-8 counts as 1e-8. Throws SolverError where a node has no mass or a place row touches only
-  // fixed control points.
+  // `residual` bounds ProjectionReport::residual; a `regularisation` below 1e-8 counts as 1e-8. Throws SolverError
+  // where a node has no mass or a place row touches only fixed control points.
   LagrangeNewton(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
                  const ProjectionOptions& options = {});
   ~LagrangeNewton() override;
@@ -39,10 +38,9 @@ class LagrangeNewton final : public ConstraintSolver {
   // Iterates until the tolerances and `residual` are met, else as FastProjection does. Multipliers start at 0, as in
   // the paper: the first iteration is the projection's. A step is the projection of its candidate.
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) override;
-  ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, double t, const Eigen::Ref<const Eigen::VectorXd>& start,
-                        double dt, ConstraintForces& forces) override;
+  ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                        const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) override;
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
-  double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
   const Eigen::VectorXd& strain_multipliers() const override;
   const Eigen::Matrix3Xd& place_multipliers() const override;
   const Eigen::Matrix3Xd& strain_impulses() const override;

@@ -32,19 +32,39 @@ class LimitLaw {
     const double s = 1 + compliance_ * std::abs(lambda) / width(lambda);
     return compliance_ / (s * s);
   }
-  // The multiplier that belongs to a strain: 0 within the slack, finite beyond the limit too (as at 98 % of the width).
+  // 1 over what is left to the limit: by which part of itself the force changes for a strain, near the wall.
+  double steepness(double lambda) const { return (1 + compliance_ * std::abs(lambda) / width(lambda)) / width(lambda); }
+  // The multiplier that belongs to a strain: 0 within the slack. From `last` of the width on it goes on straight, so
+  // that it is finite beyond the limit too.
   double multiplier(double strain) const {
-    const double z = std::min((std::abs(strain) - band_.slack * limit(strain)) / width(strain), 0.98);
-    return z > 0 ? std::copysign(width(strain) * z / (1 - z) / compliance_, strain) : 0;
+    const double z = share(strain), inner = std::min(z, last);
+    return z > 0 ? std::copysign(width(strain) / compliance_ * (inner / (1 - inner) + (z - inner) * steepest), strain)
+                 : 0;
   }
-  // Integral of the multiplier over the strain, in units of lambda; 0 within the slack.
+  // The same by the law itself wherever that has one.
+  double force(double strain) const {
+    const double z = share(strain);
+    return z > last && z < 1 ? std::copysign(width(strain) / compliance_ * z / (1 - z), strain) : multiplier(strain);
+  }
+  // Its slope.
+  double stiffness(double strain) const {
+    const double z = share(strain), inner = 1 - std::min(z, last);
+    return z > 0 ? 1 / (compliance_ * inner * inner) : 0;
+  }
+  // Its integral over the strain, in units of lambda; 0 within the slack.
   double energy(double strain) const {
-    const double w = width(strain), z = std::min((std::abs(strain) - band_.slack * limit(strain)) / w, 0.98);
-    return z > 0 ? w * w / compliance_ * (-z - std::log1p(-z)) : 0;
+    const double w = width(strain), z = share(strain), inner = std::min(z, last), beyond = z - inner;
+    if (!(z > 0)) return 0;
+    return w * w / compliance_ *
+           (-inner - std::log1p(-inner) + beyond * (inner / (1 - inner) + 0.5 * beyond * steepest));
   }
+  bool has_slack() const { return band_.slack > 0; }
   bool slack_at(double strain) const { return std::abs(strain) <= band_.slack * limit(strain); }
 
  private:
+  static constexpr double last = 0.98, steepest = 1 / ((1 - last) * (1 - last));
+  // Of the width; negative within the slack.
+  double share(double strain) const { return (std::abs(strain) - band_.slack * limit(strain)) / width(strain); }
   double limit(double sign) const { return std::signbit(sign) ? band_.compress : band_.stretch; }  // of -0.0 too
   double width(double sign) const { return (1 - band_.slack) * limit(sign); }
   StrainBand band_;

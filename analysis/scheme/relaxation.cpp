@@ -22,7 +22,9 @@ double largest_move(const MechanicalSystem& system, const Eigen::VectorXd& from,
 
 void begin(Relaxation& r, bool trial, const Eigen::VectorXd& q) {
   r.trial = trial;
-  r.length = trial ? std::max(least_trial, r.steps) : std::max(least_window, r.steps / windows_at_least);
+  // A trial lasts as long at small steps as at large ones.
+  const int trial_steps = static_cast<int>(least_trial / r.dt_share);
+  r.length = trial ? std::max(trial_steps, r.steps) : std::max(least_window, r.steps / windows_at_least);
   r.count = 0;
   r.moved = 0;
   r.halts_before = r.halts;
@@ -48,8 +50,12 @@ bool relax(const MechanicalSystem& system, const StepWork& work, const StepRepor
   r.kinetic = halts ? 0 : report.kinetic;
   if (halts) {
     ++r.halts;
-    // x~ = x + dt v + dt^2/2 a, and the projection adds dt^2 a_c: from rest the cloth goes dt^2/2 (a + a_c).
-    state.v = -0.5 * report.dt * work.constraint;
+    // Where v lacks half of the constraints' impulse: x~ = x + dt v + dt^2/2 a, and the projection adds dt^2 a_c, so
+    // that from rest the cloth goes dt^2/2 (a + a_c).
+    if (!system.projection || system.projection->end_velocity())
+      state.v.setZero();
+    else
+      state.v = -0.5 * report.dt * work.constraint;
   }
   if (!over) return halts;
   if (!r.trial && (r.halts - r.halts_before) * steps_per_halt > r.count)

@@ -21,15 +21,15 @@ Elastic total_force(const MechanicalSystem& system, const Vector& q, Vector& f) 
   return elastic;
 }
 
-// M a + C (v + h (a + constraint) - wind) = f, with h = 0 for an explicit start.
+// M a + C (v + h a + lag constraint - wind) = f, with h = 0 for an explicit start.
 void acceleration(const MechanicalSystem& system, const Vector& q_force, const Vector& v, const Vector& constraint,
-                  double h, Vector& a) {
+                  double lag, double h, Vector& a) {
   a.resize(3 * system.map->nodes());
   system.map->reduce(q_force, a, system.workers);
   share_out(system.workers, system.map->nodes(), [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       const double m = system.node_mass[k], c = system.node_drag[k];
-      const Eigen::Vector3d known = v.segment<3>(3 * k) + h * constraint.segment<3>(3 * k);
+      const Eigen::Vector3d known = v.segment<3>(3 * k) + lag * constraint.segment<3>(3 * k);
       a.segment<3>(3 * k) = (a.segment<3>(3 * k) - c * (known - system.loads.wind)) / (m + h * c);
     }
   });
@@ -91,7 +91,7 @@ void initialise(const MechanicalSystem& system, DynamicState& state) {
   state.q.resize(3 * system.map->control_points());
   system.map->expand(state.x, state.t, state.q);
   total_force(system, state.q, state.f);
-  acceleration(system, state.f, state.v, Vector::Zero(state.v.size()), 0, state.a);
+  acceleration(system, state.f, state.v, Vector::Zero(state.v.size()), 0, 0, state.a);
 }
 
 StepReport step(const MechanicalSystem& system, DynamicState& state, double dt) {
@@ -106,25 +106,28 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
   DynamicState& next = work.other;
   next.t = state.t + dt;
   for (Vector* v : {&work.candidate, &work.move, &work.constraint, &next.x, &next.v}) v->resize(state.x.size());
+  const bool end_velocity = !system.projection || system.projection->end_velocity();
   share_pieces(system.workers, nodes, [&](int, int begin, int end) {
     const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
     piece(work.candidate) = piece(state.x) + dt * piece(state.v) + (0.5 * dt * dt) * piece(state.a);
     piece(next.x) = piece(work.candidate);
+    piece(next.v) = piece(state.v) + dt * piece(state.a);
   });
   report.projection.converged = true;
+  report.at_end = system.projection && end_velocity;
   if (system.projection) {
     const Clock::time_point start = Clock::now();
     next.constraint = state.constraint;
-    report.projection = system.projection->step(next.x, next.t, state.x, dt, next.constraint);
+    report.projection = system.projection->step(next.x, next.v, next.t, state.x, dt, next.constraint);
     report.limit_energy = report.projection.energy;
     report.projection_seconds = since(start);
   }
-  Vector& v_half = next.v;  // becomes the velocity at the end
+  // What the velocity is but for the acceleration of the end.
   share_pieces(system.workers, nodes, [&](int, int begin, int end) {
     const auto piece = [&](auto& v) { return v.segment(3 * begin, 3 * (end - begin)); };
     piece(work.move) = piece(next.x) - piece(state.x);
     piece(work.constraint) = (piece(next.x) - piece(work.candidate)) / (dt * dt);
-    piece(v_half) = piece(work.move) / dt;
+    piece(next.v) -= (0.5 * dt) * piece(state.a);
   });
 
   next.q.resize(3 * system.map->control_points());
@@ -133,7 +136,7 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
   const Clock::time_point start = Clock::now();
   report.elastic = total_force(system, next.q, next.f);
   report.force_seconds = since(start);
-  acceleration(system, next.f, v_half, work.constraint, 0.5 * dt, next.a);
+  acceleration(system, next.f, next.v, work.constraint, end_velocity ? 0 : 0.5 * dt, 0.5 * dt, next.a);
 
   const int control_points = system.map->control_points();
   work.sums.assign(static_cast<std::size_t>(pieces(control_points)), {});
@@ -142,14 +145,15 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
     for (int k = begin; k < end; ++k) {
       const auto move = work.move.segment<3>(3 * k), held = work.constraint.segment<3>(3 * k);
       const auto a = next.a.segment<3>(3 * k);
-      auto v = v_half.segment<3>(3 * k);
+      auto v = next.v.segment<3>(3 * k);
+      const Eigen::Vector3d v_half = move / dt;
       const double mass = system.node_mass[k];
-      sums.kinetic += 0.5 * mass * v.squaredNorm();
-      sums.drag_work -= system.node_drag[k] * (v - system.loads.wind).dot(move);
+      sums.kinetic += 0.5 * mass * v_half.squaredNorm();
+      sums.drag_work -= system.node_drag[k] * (v_half - system.loads.wind).dot(move);
       sums.kick +=
           0.125 * dt * dt * mass * std::max((state.a.segment<3>(3 * k) + held).squaredNorm(), (a + held).squaredNorm());
+      sums.kick_end += 0.125 * dt * dt * mass * a.squaredNorm();
       v += 0.5 * dt * a;
-      if (!system.projection) sums.kinetic_end += 0.5 * mass * v.squaredNorm();
       sums.finite = sums.finite && next.x.segment<3>(3 * k).allFinite() && a.allFinite();
     }
     work.sums[static_cast<std::size_t>(index)] = sums;
@@ -159,10 +163,17 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
     work.sums[static_cast<std::size_t>(index)].load_work =
         piece(system.loads.force).dot(piece(next.q) - piece(state.q));
   });
+  if (report.at_end) system.projection->settle(next.v, next.t);
+  share_pieces(system.workers, end_velocity ? nodes : 0, [&](int index, int begin, int end) {
+    for (int k = begin; k < end; ++k)
+      work.sums[static_cast<std::size_t>(index)].kinetic_end +=
+          0.5 * system.node_mass[k] * next.v.segment<3>(3 * k).squaredNorm();
+  });
   for (const StepWork::Sums& sums : work.sums) {
     report.kinetic += sums.kinetic;
     report.kinetic_end += sums.kinetic_end;
     report.kick += sums.kick;
+    report.kick_end += sums.kick_end;
     report.drag_work += sums.drag_work;
     report.load_work += sums.load_work;
     report.finite = report.finite && sums.finite;

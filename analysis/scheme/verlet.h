@@ -37,8 +37,10 @@ struct StepReport {
   Elastic elastic;          // at the end
   double limit_energy = 0;  // J, of the strain limits at the end
   double kinetic = 0;       // J, in the middle of the step, where the velocity obeys the constraints
-  double kinetic_end = 0;   // J, at the end; without projection only, whose forces the velocity there lacks
+  double kinetic_end = 0;   // J, at the end, unless a solver's forces lack there (ConstraintSolver::end_velocity)
   double kick = 0;          // J, kinetic energy of half a step's acceleration: by so much `kinetic` depends on dt
+  double kick_end = 0;      // J, by the cloth's own acceleration at the end
+  bool at_end = false;      // a solver with end_velocity(): the law below holds at the end
   double load_work = 0;     // J, work of dead loads in the step
   double drag_work = 0;     // J, work of drag (negative: dissipated)
   double motion_work = 0;   // J, work of moved pins
@@ -46,7 +48,8 @@ struct StepReport {
   double force_seconds = 0, projection_seconds = 0;  // wall time
 };
 // In the middle of a step, kinetic + mean of (elastic + limit_energy) at both ends - works up to the step - half the
-// works of the step never rises, up to the order of the scheme: what projection takes is lost, nothing is gained.
+// works of the step never rises, up to the order of the scheme: what projection takes is lost, nothing is gained. At
+// its end that is kinetic_end - kick_end + elastic + limit_energy - works: of linear forces Verlet keeps this exactly.
 // Masses and drag are the nodes'.
 
 // Everything a step needs that doesn't change from step to step. The caller keeps the parts alive.
@@ -72,7 +75,7 @@ void initialise(const MechanicalSystem& system, DynamicState& state);
 struct StepWork {
   // Energies of a piece of the nodes or control points, so that no sum depends on the number of threads.
   struct Sums {
-    double kinetic = 0, kinetic_end = 0, kick = 0, drag_work = 0, load_work = 0;
+    double kinetic = 0, kinetic_end = 0, kick = 0, kick_end = 0, drag_work = 0, load_work = 0;
     bool finite = true;
   };
   DynamicState other;  // after a finite step: the state before it, which a swap brings back

@@ -14,6 +14,7 @@
 #include "analysis/constraint/select_rows.h"
 #include "analysis/projection/fast_projection.h"
 #include "analysis/projection/lagrange_newton.h"
+#include "analysis/projection/primal_dual.h"
 #include "geometry/error.h"
 #include "pipeline/build/pin_reach.h"
 #include "pipeline/build/places.h"
@@ -271,19 +272,11 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
       means.insert(means.end(), panel.mean_rows.begin(), panel.mean_rows.end());
     rows.strain = select_rows(*build.model, *system->map, system->points, rows.place, means);
     if (means.empty()) system->unbalanced = unbalanced_part(*build.model, *system->map, rows.strain);
-    if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::second_order) {
-      std::vector<double> stiffness, rate;
-      for (std::size_t k = 0; k < build.panels.size(); ++k) {
-        const ClothPanel& panel = build.model->panels()[k];
+    if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::newton) {
+      std::vector<double> stiffness;
+      for (std::size_t k = 0; k < build.panels.size(); ++k)
         stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
-        // Slow vibrations of the limit lose in a step what waves cross of the panel and back: with half of it example
-        // 4.1(a) gains 6e-5 of the work of gravity at 4 ms, with all of it nothing.
-        rate.push_back(2 * std::sqrt(stiffness.back() / panel.fabric.density) / extent(panel));
-      }
-      for (StrainRow& row : rows.strain) {
-        row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
-        row.damping_rate = rate[static_cast<std::size_t>(row.panel)];
-      }
+      for (StrainRow& row : rows.strain) row.stiffness = stiffness[static_cast<std::size_t>(row.panel)] * row.area;
     }
   }
   for (std::size_t k = 0; k < build.panels.size(); ++k) {
@@ -295,14 +288,17 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   system->place_rows = static_cast<int>(rows.place.size());
   if (!rows.strain.empty() || !rows.place.empty()) {
     ProjectionOptions options;
-    options.variant = limit.variant;
-    options.weft = limit.weft;
-    options.warp = limit.warp;
     options.tolerance = limit.tolerance;
     options.regularisation = limit.regularisation;
     options.max_iterations = limit.max_iterations;
     if (limit.solver == LimitSolver::lagrange)
       system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
+    else if (limit.on && limit.variant == ProjectionVariant::newton)
+      system->projection = std::make_unique<PrimalDual>(*system->map, dynamic.node_mass, std::move(rows),
+                                                        PrimalDualOptions{.weft = limit.weft,
+                                                                          .warp = limit.warp,
+                                                                          .tolerance = limit.tolerance,
+                                                                          .max_iterations = limit.max_iterations});
     else
       system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
     system->projection->use_threads(dynamic.workers);

@@ -20,9 +20,10 @@ std::string judge(EnergyWatch& watch, const EnergyBalance& before, const StepRep
   if (!report.finite) return "the numbers are no longer finite";
   const EnergyBalance& e = before;
   const double elastic = report.elastic.total() + report.limit_energy;
-  const double now = report.kinetic + 0.5 * (e.elastic() + elastic);
-  const double work =
-      e.load_work + e.drag_work + e.motion_work + 0.5 * (report.load_work + report.drag_work + report.motion_work);
+  const double now =
+      report.at_end ? report.kinetic_end - report.kick_end + elastic : report.kinetic + 0.5 * (e.elastic() + elastic);
+  const double work = e.load_work + e.drag_work + e.motion_work +
+                      (report.at_end ? 1 : 0.5) * (report.load_work + report.drag_work + report.motion_work);
   const double balance = now - e.start - work;
   const double exchanged = std::max({watch.exchanged, std::abs(e.load_work + report.load_work),
                                      std::abs(e.motion_work + report.motion_work), std::abs(e.drag_work), e.now()});
@@ -39,7 +40,7 @@ std::string judge(EnergyWatch& watch, const EnergyBalance& before, const StepRep
                        std::max(balance, stored), exchanged);
   }
   watch.exchanged = exchanged;
-  watch.kick = report.kick;
+  watch.kick = report.at_end ? report.kick_end : report.kick;
   // What a smaller step seems to gain is no rise.
   watch.trough += std::clamp(balance - watch.balance, 0.0, smaller_step);
   watch.trough = careful ? std::min(watch.trough, balance) : balance;
@@ -48,7 +49,7 @@ std::string judge(EnergyWatch& watch, const EnergyBalance& before, const StepRep
 }
 
 void add_step(EnergyBalance& energy, const StepReport& report, const EnergyWatch& watch) {
-  energy.kinetic = report.kinetic;
+  energy.kinetic = report.at_end ? report.kinetic_end : report.kinetic;
   energy.stored = report.elastic.energy;
   energy.stored.set("limit", report.limit_energy);
   energy.load_work += report.load_work;

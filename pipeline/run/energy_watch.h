@@ -11,7 +11,7 @@
 namespace toile {
 
 struct EnergyBalance {
-  double kinetic = 0;                                    // J, in the middle of the last step
+  double kinetic = 0;                                    // J, where the last step's velocity obeys the constraints
   EnergyParts stored;                                    // J, now: the potentials', and "limit" of the strain limits
   double start = 0;                                      // J, kinetic and elastic at the start
   double load_work = 0, drag_work = 0, motion_work = 0;  // J, since the start
@@ -42,8 +42,9 @@ void fields(auto& archive, Like<EnergyWatch> auto& w) {
 // Why the step that `report` tells of can't be accepted after `before`; empty where it can, and then the watch moves
 // on.
 //   (1) its numbers are finite;
-//   (2) kinetic + elastic energy less the work of loads, drag and moved pins, all in the middle of the step, rises by
-//       no more than 5 % of the energy exchanged so far, and in all by no more than 20 %;
+//   (2) kinetic + elastic energy less the work of loads, drag and moved pins, in the middle of the step or at its end
+//       (StepReport::at_end), rises by no more than 5 % of the energy exchanged so far, and in all by no more than 20
+//       %;
 //   (3) `careful`: by no more than half a percent since a step was last refused. For steps that follow a bound.
 // `dt_before`: of the step before [s]; a smaller step may seem to gain that step's kick.
 std::string judge(EnergyWatch& watch, const EnergyBalance& before, const StepReport& report, double dt_before,

@@ -207,7 +207,8 @@ class Run::Impl {
       const StepReport report = toile::step(result_.system->dynamic, result_.state, dt, work_);
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
-      const std::string trouble = judge(result_.watch, result_.energy, report, result_.dt_last, careful());
+      std::string trouble = unmet(report);
+      if (trouble.empty()) trouble = judge(result_.watch, result_.energy, report, result_.dt_last, careful());
       if (trouble.empty()) {
         accept(report);
         if (scene_.rest) relax_after(report);
@@ -239,11 +240,20 @@ class Run::Impl {
     }
   }
 
+  // A limit with a law has a balance at every step that is small enough; hard rows that depend on each other may not.
+  std::string unmet(const StepReport& report) const {
+    const ProjectionReport& p = report.projection;
+    if (p.converged || hard_limit() || !scene_.strain_limit.on) return {};
+    return fmt::format(
+        "the strain limit and the pins find no balance in {} iterations (strain {:.3g}, pins off by {:.3g} m)",
+        p.iterations, p.strain_violation, p.place_violation);
+  }
+
   void relax_after(const StepReport& report) {
     Relaxation& relaxation = result_.relaxation;
     if (relax(result_.system->dynamic, work_, report, tolerance_, result_.state, relaxation)) {
       result_.energy.kinetic = 0;
-      result_.watch.balance -= report.kinetic;
+      result_.watch.balance -= report.at_end ? report.kinetic_end : report.kinetic;
       result_.watch.trough = result_.watch.balance;
     }
     if (result_.state.t < pins_done_) restart(relaxation);

@@ -484,8 +484,8 @@ void read_limit(Table table, Scene& scene) {
     table.number(stiffness, "stiffness", dimension::force_per_length, Range::positive);
     limit.stiffness = stiffness;
   }
-  if (const auto variant = table.choice("variant", {"second-order", "paper"}, {}))
-    limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::second_order;
+  if (const auto variant = table.choice("variant", {"newton", "paper", "second-order"}, {}))
+    limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::newton;
   if (band && limit.variant == ProjectionVariant::paper)
     throw InputError(table.where() + ": variant = \"paper\" has no bands");
   // "fast" is another word for the projection.

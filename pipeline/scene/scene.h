@@ -13,7 +13,7 @@
 
 #include "analysis/constraint/point_rule.h"
 #include "analysis/fabric/fabric.h"
-#include "analysis/projection/fast_projection.h"
+#include "analysis/projection/limit_law.h"
 #include "io/iges.h"
 #include "io/panel_file.h"
 #include "pipeline/scene/addresses.h"
@@ -95,6 +95,7 @@ struct SceneObstacle {
 };
 
 enum class LimitSolver { projection, lagrange };
+enum class ProjectionVariant { newton, paper };  // PrimalDual; fast projection, eqs. (29) to (36)
 
 struct StrainLimit {
   bool on = false;
@@ -104,8 +105,8 @@ struct StrainLimit {
   std::optional<double> stiffness;  // N/m of force per strain before the wall; unset: chosen by the loads
   PointRule points = PointRule::greville_derivative;  // at p = 2 the knot mesh
   LimitSolver solver = LimitSolver::projection;
-  ProjectionVariant variant = ProjectionVariant::second_order;  // of the projection
-  double regularisation = 1e-3;                                 // the default of ProjectionOptions
+  ProjectionVariant variant = ProjectionVariant::newton;  // of the projection
+  double regularisation = 1e-3;                           // the default of ProjectionOptions
   int max_iterations = 50;
 };
 

@@ -150,7 +150,7 @@ TEST(LagrangeNewton, WhatBucklesInAStepIsProjected) {
   const FlatCloth c = flat_cloth(2, 8);
   const ConstraintRows rows{vertex_rows(c), {}};
   LagrangeNewton solver(free_map(c), c.mass, rows);
-  FastProjection projection(free_map(c), c.mass, rows, {.variant = ProjectionVariant::paper});
+  FastProjection projection(free_map(c), c.mass, rows);
   const Eigen::VectorXd candidate = 0.7 * c.rest + 1e-6 * disturbed(c.rest, 1, 8);
   Eigen::VectorXd x = candidate, projected = candidate;
   const ProjectionReport report = solver.project(x, 0);

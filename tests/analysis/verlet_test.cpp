@@ -10,6 +10,7 @@
 
 #include "analysis/projection/fast_projection.h"
 #include "analysis/projection/lagrange_newton.h"
+#include "analysis/projection/primal_dual.h"
 #include "support/near.h"
 #include "support/panels.h"
 
@@ -17,6 +18,8 @@ namespace toile {
 namespace {
 
 const Eigen::Vector3d gravity(0, 0, -9.81);
+
+enum class Solver { newton, paper, lagrange };
 
 // A square panel with strain rows at its knot vertices, control points held, material points pinned.
 struct Scene {
@@ -36,7 +39,8 @@ struct Scene {
     bool limits = true;
     bool gravity = true;
     ProjectionOptions projection = {};
-    bool lagrange = false;
+    Solver solver = Solver::newton;
+    PrimalDualOptions newton = {};
     double stiffness = 1170;  // N/m, of the strain limit: ten weights of a square metre at 1 % strain
   };
 
@@ -70,22 +74,24 @@ struct Scene {
         points[0].back().u = u, points[0].back().v = v;
       }
     if (o.limits) rows.strain = strain_rows(model, map, points);
-    for (StrainRow& row : rows.strain) {
-      row.stiffness = o.stiffness * row.area;
-      row.damping_rate = 2 * std::sqrt(o.stiffness / o.fabric.density) / o.size;
-    }
+    for (StrainRow& row : rows.strain) row.stiffness = o.stiffness * row.area;
     for (const Eigen::Vector2d& uv : o.pins) {
       const Eigen::Vector3d place = rest(uv[0], uv[1]);
       rows.place.push_back({model.place(0, uv[0], uv[1]), 0, [place](double) { return place; }});
     }
-    if (!rows.strain.empty() || !rows.place.empty())
-      projection = o.lagrange ? std::unique_ptr<ConstraintSolver>(
-                                    std::make_unique<LagrangeNewton>(map, system.node_mass, rows, o.projection))
-                              : std::make_unique<FastProjection>(map, system.node_mass, rows, o.projection);
+    if (!rows.strain.empty() || !rows.place.empty()) projection = solver(o, std::move(rows));
     system.projection = projection.get();
     state.x = map.restrict(model.rest());
     state.v = Eigen::VectorXd::Zero(state.x.size());
     initialise(system, state);
+  }
+
+  std::unique_ptr<ConstraintSolver> solver(const Options& o, ConstraintRows rows) const {
+    if (o.solver == Solver::lagrange)
+      return std::make_unique<LagrangeNewton>(map, system.node_mass, std::move(rows), o.projection);
+    if (o.solver == Solver::paper)
+      return std::make_unique<FastProjection>(map, system.node_mass, std::move(rows), o.projection);
+    return std::make_unique<PrimalDual>(map, system.node_mass, std::move(rows), o.newton);
   }
 
   Eigen::VectorXd places() const {
@@ -128,36 +134,31 @@ TEST(Verlet, DragLeadsToTerminalVelocityAndFollowsTheWind) {
     EXPECT_LT((scene.state.v.segment<3>(3 * k) - terminal).norm(), 1.05 * left * terminal.norm());
 }
 
-// Energy less work in the middle of each step, where the velocity obeys the constraints.
+// Energy less work where the velocity obeys the constraints: in the middle of each step, or at its end.
 class Balance {
  public:
+  explicit Balance(bool at_end = false) : at_end_(at_end) {}
   double operator()(const StepReport& report) {
     const double elastic = report.elastic.total() + report.limit_energy;
     const double work = report.load_work + report.drag_work + report.motion_work;
-    const double balance = report.kinetic + 0.5 * (elastic_ + elastic) - work_ - 0.5 * work;
+    const double balance = at_end_ ? report.kinetic_end - report.kick_end + elastic - work_ - work
+                                   : report.kinetic + 0.5 * (elastic_ + elastic) - work_ - 0.5 * work;
     elastic_ = elastic;
     work_ += work;
     return balance;
   }
 
  private:
+  bool at_end_;
   double elastic_ = 0, work_ = 0;
 };
 
 // The law that redundancy breaks most easily: two pinned corners make the rows of the edge between them dependent.
 TEST(Verlet, EnergyOfAnUndampedProjectedRunNeverRises) {
-  struct Method {
-    ProjectionVariant variant;
-    bool lagrange;
-  };
-  for (const Method method : {Method{ProjectionVariant::second_order, false}, Method{ProjectionVariant::paper, false},
-                              Method{ProjectionVariant::paper, true}})
+  for (const Solver solver : {Solver::newton, Solver::paper, Solver::lagrange})
     for (double dt : {4e-3, 2e-3, 1e-3}) {
-      Scene scene({.fabric = without_drag(),
-                   .fixed = {0, 9},
-                   .projection = {.variant = method.variant},
-                   .lagrange = method.lagrange});
-      Balance balance;
+      Scene scene({.fabric = without_drag(), .fixed = {0, 9}, .solver = solver});
+      Balance balance(solver == Solver::newton);
       double work = 0, most_work = 0, highest = 0;
       for (int k = 0; k < std::lround(1.2 / dt); ++k) {
         const StepReport report = step(scene.system, scene.state, dt);
@@ -167,13 +168,33 @@ TEST(Verlet, EnergyOfAnUndampedProjectedRunNeverRises) {
         most_work = std::max(most_work, work);
         // The middle of a step leaves out what half a step's acceleration adds: the law holds with it too, but for the
         // paper's variant, which is above by 3e-4 of the work at 4 ms.
-        const bool paper = method.variant == ProjectionVariant::paper && !method.lagrange;
-        const double left_out = paper ? 0 : report.kick;
+        const double left_out = solver == Solver::lagrange ? report.kick : 0;
         highest = std::max(highest, balance(report) + left_out);
       }
       EXPECT_GT(most_work, 0.5);
-      EXPECT_LT(highest, 2e-6 * most_work) << dt << (method.lagrange ? " lagrange" : "");
+      EXPECT_LT(highest, 2e-6 * most_work) << dt << " by solver " << static_cast<int>(solver);
     }
+}
+
+// A step remembers nothing of the size of the one before. (With three steps' forces kept, 7 % were lost here.)
+TEST(Verlet, AlternatingStepSizesLoseNoMoreThanEqualOnes) {
+  const auto lost = [](double dt, double other) {  // of gravity's work, in 0.6 s
+    Scene scene({.fabric = without_drag(), .fixed = {0, 9}});
+    Balance balance(true);
+    double work = 0, left = 0;
+    for (int k = 0; scene.state.t < 0.6; ++k) {
+      const StepReport report = step(scene.system, scene.state, k % 2 == 0 ? dt : other);
+      EXPECT_TRUE(report.projection.converged);
+      work += report.load_work;
+      left = balance(report);
+    }
+    return -left / work;
+  };
+  const double bound = 4.2e-3;  // of the cloth alone
+  const double equal = lost(0.6 * bound, 0.6 * bound);
+  EXPECT_LT(std::abs(equal), 2.5e-3);
+  EXPECT_LT(std::abs(lost(0.6 * bound, 0.06 * bound) - equal), 1e-3);
+  EXPECT_LT(std::abs(lost(0.6 * bound, 0.001 * bound) - equal), 1e-3);
 }
 
 TEST(Verlet, EnergyBalancesWithoutProjectionToSecondOrder) {
@@ -238,8 +259,8 @@ TEST(Verlet, HalvingTheStepMovesTheFreeCornerByLessThanHalfOfTheChangeBefore) {
   fabric.bending.kappa_reg = 1;
   for (double until : {0.3, 0.6}) {
     std::vector<Eigen::VectorXd> q;
-    for (double dt : {4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4}) {
-      Scene scene({.fabric = fabric, .fixed = {0, 9}});
+    for (double dt : {2e-3, 1e-3, 5e-4, 2.5e-4}) {
+      Scene scene({.fabric = fabric, .fixed = {0, 9}, .newton = {.force_residual = 1e-4, .law_residual = 1e-4}});
       run(scene, dt, until);
       q.push_back(scene.places());
     }
@@ -273,11 +294,11 @@ TEST(Verlet, TheFreeCornerIsWithinHalfAMillimetreAtTheLargestStep) {
 TEST(Verlet, LagrangeNewtonAndTheProjectionDifferByTheSquareOfTheStep) {
   Fabric fabric;
   fabric.bending.kappa_reg = 3;  // a smooth law: its kink hides the order
-  const ProjectionOptions options{.variant = ProjectionVariant::paper, .residual = 1e-9};
+  const ProjectionOptions options{.residual = 1e-9};
   double previous = 0;
   for (double dt : {2e-3, 1e-3, 5e-4}) {
-    Scene newton({.fabric = fabric, .fixed = {0, 9}, .projection = options, .lagrange = true}),
-        projection({.fabric = fabric, .fixed = {0, 9}, .projection = options});
+    Scene newton({.fabric = fabric, .fixed = {0, 9}, .projection = options, .solver = Solver::lagrange}),
+        projection({.fabric = fabric, .fixed = {0, 9}, .projection = options, .solver = Solver::paper});
     run(newton, dt, 0.2);
     run(projection, dt, 0.2);
     const double distance = (newton.places() - projection.places()).cwiseAbs().maxCoeff();
@@ -289,10 +310,10 @@ TEST(Verlet, LagrangeNewtonAndTheProjectionDifferByTheSquareOfTheStep) {
   }
 }
 
-void expect_weight_on_pins(bool lagrange) {
+void expect_weight_on_pins(Solver solver) {
   Fabric fabric;
   fabric.drag = 0.8;
-  Scene scene({.size = 0.3, .spans = 4, .fabric = fabric, .fixed = {0, 5}, .pins = {{0.5, 0.9}}, .lagrange = lagrange});
+  Scene scene({.size = 0.3, .spans = 4, .fabric = fabric, .fixed = {0, 5}, .pins = {{0.5, 0.9}}, .solver = solver});
   const double dt = 5e-4;
   run(scene, dt, 4);
   const Reactions pins = reactions(scene.system, scene.state, dt);
@@ -304,9 +325,9 @@ void expect_weight_on_pins(bool lagrange) {
   expect_near_rel(pins.fixed(2, 0), pins.fixed(2, 1), 1e-2);
 }
 TEST(Verlet, PinsOfAHangingClothCarryItsWeight) {
-  for (const bool lagrange : {false, true}) {
-    SCOPED_TRACE(lagrange ? "lagrange" : "projection");
-    expect_weight_on_pins(lagrange);
+  for (const Solver solver : {Solver::newton, Solver::paper, Solver::lagrange}) {
+    SCOPED_TRACE(static_cast<int>(solver));
+    expect_weight_on_pins(solver);
   }
 }
 
@@ -331,8 +352,8 @@ TEST(Verlet, PinsThatMoveTheClothAccelerateItAgainstTheAir) {
   EXPECT_LT((total - expected).norm(), 1e-6 * expected.norm());
 }
 
-// The constraint forces of a step have no moment about the places at its start, as the cloth's own forces have none:
-// with velocities between the steps, sum m v and sum m x x v are constant.
+// The cloth's own forces and the constraints' have no sum, and no moment about where they act: with velocities between
+// the steps sum m v is constant, and sum m x x v nearly so.
 TEST(Verlet, FreeClothKeepsItsMomentumAndItsSpin) {
   Fabric fabric;
   fabric.drag = 0;
@@ -367,7 +388,7 @@ TEST(Verlet, FreeClothKeepsItsMomentumAndItsSpin) {
   for (int k = 0; k < 400; ++k) {
     const Motion now = advance();
     EXPECT_LT((now.momentum - first.momentum).norm(), 1e-11 * first.momentum.norm());
-    EXPECT_LT((now.spin - first.spin).norm(), 1e-11 * first.spin.norm());
+    EXPECT_LT((now.spin - first.spin).norm(), 1e-5 * first.spin.norm());  // of the third order in the step
   }
   EXPECT_GT(pushed, 1e-4);  // the limits had something to do
 }
@@ -385,8 +406,8 @@ TEST(Verlet, AStepIntoNonsenseLeavesTheStateAsItWas) {
 }
 
 TEST(Verlet, RestartingFromAStateContinuesBitByBit) {
-  for (const bool lagrange : {false, true}) {
-    Scene one({.fixed = {0, 9}, .lagrange = lagrange}), two({.fixed = {0, 9}, .lagrange = lagrange});
+  for (const Solver solver : {Solver::newton, Solver::paper, Solver::lagrange}) {
+    Scene one({.fixed = {0, 9}, .solver = solver}), two({.fixed = {0, 9}, .solver = solver});
     run(one, 4e-3, 0.2);
     two.state = one.state;
     run(one, 4e-3, 0.1);
