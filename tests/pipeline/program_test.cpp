@@ -282,7 +282,7 @@ TEST(Program, StrainBetweenThePointsOfTheLimitIsTold) {
   EXPECT_NE(pulled.err.find("between the points that hold the limit of 0.01"), std::string::npos) << pulled.err;
   const Outcome pushed = toile(
       folder, run +
-                  " --set 'pin=[{ at = \"curve:0,3\" }, { at = \"curve:0,1\", move = { translate = [-0.05, 0, 0], "
+                  " --set 'pin=[{ at = \"curve:0,3\" }, { at = \"curve:0,1\", move = { translate = [-0.1, 0, 0], "
                   "end = 0.4 } }]' --until 0.5");
   EXPECT_EQ(pushed.code, 0) << pushed.err;
   EXPECT_NE(pushed.err.find("squeezed by"), std::string::npos) << pushed.err;
