@@ -280,10 +280,10 @@ TEST(Program, StrainBetweenThePointsOfTheLimitIsTold) {
   const Outcome pulled = toile(folder, run + " --set 'traction=[{ along = \"curve:0,0\", force = [4, 0, 0] }]'");
   EXPECT_EQ(pulled.code, 0) << pulled.err;
   EXPECT_NE(pulled.err.find("between the points that hold the limit of 0.01"), std::string::npos) << pulled.err;
-  const Outcome pushed = toile(
-      folder, run +
-                  " --set 'pin=[{ at = \"curve:0,3\" }, { at = \"curve:0,1\", move = { translate = [-0.1, 0, 0], "
-                  "end = 0.4 } }]' --until 0.5");
+  const Outcome pushed =
+      toile(folder, run +
+                        " --set 'pin=[{ at = \"curve:0,3\" }, { at = \"curve:0,1\", move = { translate = [-0.1, 0, 0], "
+                        "end = 0.4 } }]' --until 0.5");
   EXPECT_EQ(pushed.code, 0) << pushed.err;
   EXPECT_NE(pushed.err.find("squeezed by"), std::string::npos) << pushed.err;
 }
