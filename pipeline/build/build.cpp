@@ -403,4 +403,20 @@ Build build(Scene scene) {
   return result;
 }
 
+double longest_span(const Build& build) {
+  double longest = 0;
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const NurbsSurface& rest = build.rest(static_cast<int>(k));
+    const std::vector<double> u = rest.u().breaks(), v = rest.v().breaks();
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      for (std::size_t j = 0; j < v.size(); ++j) {
+        const Eigen::Vector3d x = rest(u[i], v[j]);
+        if (i + 1 < u.size()) longest = std::max(longest, (rest(u[i + 1], v[j]) - x).norm());
+        if (j + 1 < v.size()) longest = std::max(longest, (rest(u[i], v[j + 1]) - x).norm());
+      }
+    }
+  }
+  return longest;
+}
+
 }  // namespace toile

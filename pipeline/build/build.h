@@ -56,4 +56,7 @@ struct Build {
 // Throws InputError (files, names), GeometryError (panel, loop, place; pin or traction on a trimmed-away place).
 Build build(Scene scene);
 
+// The longest knot span of the panels at rest [m]: chords along the knot lines.
+double longest_span(const Build& build);
+
 }  // namespace toile

@@ -307,6 +307,15 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   return system;
 }
 
+double pins_move(const System& system, double t, double dt) {
+  const Eigen::Matrix3Xd moved = system.map->fixed_places(t + dt) - system.map->fixed_places(t);
+  double most = moved.cols() > 0 ? moved.colwise().norm().maxCoeff() : 0;
+  if (system.projection)
+    for (const PlaceRow& row : system.projection->rows().place)
+      most = std::max(most, (row.target(t + dt) - row.target(t)).norm());
+  return most;
+}
+
 Eigen::VectorXd control_points(const System& system, const DynamicState& state) {
   Eigen::VectorXd q(3 * system.map->control_points());
   system.map->expand(state.x, state.t, q);

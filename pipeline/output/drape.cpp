@@ -216,8 +216,13 @@ void warn_of_end(const Build& built, RunResult& result, const StateMeasures& mea
         "(refine) hold it nearer",
         pin.where, k, pin.at.text, 1000 * *measures.gaps[k]));
   }
-  if (const std::string between = strained_between_points(built, measures); !between.empty())
-    result.warnings.push_back(between);
+  const BetweenPoints between = strained_between_points(built, measures);
+  if (between.failed && result.exit == RunExit::ok) {
+    result.exit = RunExit::check_failed;
+    result.reason = between.text;
+  } else if (!between.text.empty()) {
+    result.warnings.push_back(between.text);
+  }
 }
 
 }  // namespace

@@ -10,23 +10,6 @@
 namespace toile {
 namespace {
 
-// The longest knot span of the panels at rest [m]: chords along the knot lines.
-double longest_span(const Build& build) {
-  double longest = 0;
-  for (std::size_t k = 0; k < build.panels.size(); ++k) {
-    const NurbsSurface& rest = build.rest(static_cast<int>(k));
-    const std::vector<double> u = rest.u().breaks(), v = rest.v().breaks();
-    for (std::size_t i = 0; i < u.size(); ++i) {
-      for (std::size_t j = 0; j < v.size(); ++j) {
-        const Eigen::Vector3d x = rest(u[i], v[j]);
-        if (i + 1 < u.size()) longest = std::max(longest, (rest(u[i + 1], v[j]) - x).norm());
-        if (j + 1 < v.size()) longest = std::max(longest, (rest(u[i], v[j + 1]) - x).norm());
-      }
-    }
-  }
-  return longest;
-}
-
 // Half of it, as one would type it: two digits, in mm.
 std::string smaller_span(const Build& build) {
   const double mm = 500 * longest_span(build), digit = std::pow(10, std::floor(std::log10(mm)) - 1);
@@ -37,8 +20,9 @@ std::string smaller_span(const Build& build) {
 
 }  // namespace
 
-std::string strained_between_points(const Build& build, const StateMeasures& measures) {
-  constexpr double much = 3, fold = 10;  // a fold within a span looks squeezed, and is no worse than the span
+BetweenPoints strained_between_points(const Build& build, const StateMeasures& measures) {
+  constexpr double much = 3, far = 10;
+  constexpr double fold = 10;  // a fold within a span looks squeezed, and is no worse than the span
   const StrainLimit& limit = build.scene.strain_limit;
   if (!limit.on) return {};
   for (int d : {0, 1}) {
@@ -46,12 +30,13 @@ std::string strained_between_points(const Build& build, const StateMeasures& mea
     const double most = measures.strain.p999[d], least = measures.strain.p001[d];
     const bool stretched = most > much * band.stretch;
     if (!stretched && !(-least > fold * band.compress)) continue;
-    return fmt::format(
+    const std::string what = fmt::format(
         "between the points that hold the limit of {:.2g}, the {} is {} by {:.2g} and more on a thousandth of the "
         "cloth "
         "(strain from {:.2g} to {:.2g}); a smaller span holds it at more points: {}",
         stretched ? band.stretch : band.compress, d == 0 ? "weft" : "warp", stretched ? "strained" : "squeezed",
         stretched ? most : -least, measures.strain.min[d], measures.strain.max[d], smaller_span(build));
+    return {what, most > far * band.stretch};
   }
   return {};
 }

@@ -12,8 +12,13 @@
 namespace toile {
 
 // The limit is held at its points; where the cloth between them is strained much farther, they lie too far apart: a
-// warning that names the strains and a span that would hold them. Empty where there is nothing to warn of.
-std::string strained_between_points(const Build& build, const StateMeasures& measures);
+// warning that names the strains and a span that would hold them, or, where it is stretched ten times as far and more,
+// a failed check.
+struct BetweenPoints {
+  std::string text;     // empty where there is nothing to say
+  bool failed = false;  // what is drawn is no cloth of that limit
+};
+BetweenPoints strained_between_points(const Build& build, const StateMeasures& measures);
 
 // Lines for people; `wall_seconds` from the call to the last file.
 std::vector<std::string> summary(const Build& build, const RunResult& result, const StateMeasures& measures,

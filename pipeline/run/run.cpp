@@ -19,6 +19,7 @@ constexpr double rest_share = 1e-4;  // of the largest panel, of the tolerance o
 // test.
 constexpr double smallest_careful = 1.0 / 16;
 constexpr int first_steps = 10;
+constexpr double pins_per_step = 0.1;  // of the longest span
 
 }  // namespace
 
@@ -194,6 +195,7 @@ class Run::Impl {
     if (result_.control.bound_is_due()) evaluate_bound();
     double largest = result_.control.scale * largest_step();
     if (!scene_.dt) largest *= result_.relaxation.dt_share;
+    if (!scene_.dt && result_.state.t < pins_done_) largest = held_to_pins(largest);
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
     const double count = std::max(1.0, std::ceil(left / largest * (1 - 1e-9)));
@@ -247,6 +249,12 @@ class Run::Impl {
     return fmt::format(
         "the strain limit and the pins find no balance in {} iterations (strain {:.3g}, pins off by {:.3g} m)",
         p.iterations, p.strain_violation, p.place_violation);
+  }
+
+  // Pins that would go far within a step would tear at the cloth beside them before the rest of it moves.
+  double held_to_pins(double dt) const {
+    const double way = pins_move(*result_.system, result_.state.t, dt), allowed = pins_per_step * span_;
+    return way > allowed ? dt * allowed / way : dt;
   }
 
   void relax_after(const StepReport& report) {
@@ -404,6 +412,7 @@ class Run::Impl {
   RunResult result_;
   const double tolerance_ = rest_tolerance(build_);
   const double pins_done_ = pins_done(scene_);
+  const double span_ = longest_span(build_);
   bool begun_ = false, over_ = false;
   StepWork work_;
   const Clock::time_point start_ = Clock::now();

@@ -445,6 +445,24 @@ TEST(Run, APinMovesWhatItHoldsAndLetsItGo) {
   EXPECT_EQ(result.system->place_rows, 0);
 }
 
+TEST(Run, StepsAreSmallWherePinsGoFast) {
+  const Folder folder("run_fast_pins");
+  test::write_panels(folder / "panel.igs", {test::sheet("cloth")});
+  const auto smallest = [&](const std::string& move) {
+    const std::string pins = "[[pin]]\nat = \"edge:v1\"\n" + move;
+    const std::vector<std::string> until{"solver.until=0.05"};
+    const Build b = build(parse_scene(test::scene_text(pins), folder / "scene.toml", until));
+    const RunResult result = run(b);
+    EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
+    return std::pair(result.dt_min, longest_span(b));
+  };
+  const double speed = 20;  // m/s, in the mean
+  const auto [still, same] = smallest("");
+  const auto [moved, span] = smallest("move = { translate = [0, 0, 1], end = 0.05 }\n");
+  EXPECT_GT(still, 2 * moved);
+  EXPECT_LE(moved, 1.001 * 0.1 * span / speed);
+}
+
 TEST(Run, NothingMovesWithoutLoads) {
   const Folder folder("no_loads");
   for (const std::string& pins : {std::string(), corner_pins}) {
