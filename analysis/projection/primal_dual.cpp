@@ -44,6 +44,7 @@ struct PrimalDual::Impl {
   Eigen::VectorXd gram_diagonal;  // of D M^-1 D^T, per scalar row; 0: takes no part
   RowMatrix matrix;
   Workers* workers = nullptr;
+  SmoothEnergy* smooth = nullptr;  // of minimise()
 
   Eigen::Matrix3Xd y, targets, fixed_places, gap, change;  // change: D dx
   Eigen::VectorXd strain, missed, slope;                   // per strain row: C, C - law(lambda), 1 / (dC / dlambda)
@@ -61,14 +62,15 @@ struct PrimalDual::Impl {
   ProjectionMemory memory;
   std::unique_ptr<FastProjection> projection;  // made where a start breaks the limits
 
-  Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, ConstraintRows r, const PrimalDualOptions& o)
+  Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, ConstraintRows r, const PrimalDualOptions& o,
+       const BlockPattern* added)
       : map(m),
         rows(std::move(r)),
         options(o),
         composed(compose(map, rows)),
         mass(node_mass),
         gram_diagonal(Eigen::VectorXd::Zero(composed.free.size())),
-        matrix(composed.free, mass),
+        matrix(composed.free, mass, added),
         y(3, size()),
         targets(3, places()),
         gap(3, places()),
@@ -133,7 +135,8 @@ struct PrimalDual::Impl {
   double excess(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void set_slopes();
   void set_matrix();
-  bool solve(bool anew, ProjectionReport& report);
+  bool factorise(const Eigen::VectorXd& x);
+  bool solve(const Eigen::VectorXd& x, bool anew, ProjectionReport& report);
   bool iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   bool search(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   // Notes down what the rows' forces at the present y add to the impulses.
@@ -141,6 +144,7 @@ struct PrimalDual::Impl {
     each_row([&](int r) { memory.strain_impulses.col(r) += weight * pull(r) * y.col(r); });
     memory.place_multipliers += weight * mu;
   }
+  void take(ConstraintForces& forces);  // measured at their place: what is missing follows from the strains
   void move_pins(double t);
   double merit(const Eigen::Ref<const Eigen::VectorXd>& x);
   double limit_energy();
@@ -195,6 +199,7 @@ double PrimalDual::Impl::excess(const Eigen::Ref<const Eigen::VectorXd>& x, Proj
   for (int k = 0; k < mass.size(); ++k) force.segment<3>(3 * k) = per * mass[k] * (x - guess).segment<3>(3 * k);
   const double inertia = weighted_norm(force);
   add_forces_of_rows(force);
+  if (smooth) smooth->add_gradient(x, force);
   allowed = std::max(options.force_residual * std::max(reference, inertia), rounding);
   double of_law = 0, largest = 0, near_wall = 0;  // over the limit; over what is left to it
   for (int r = 0; r < strains(); ++r) {
@@ -225,9 +230,14 @@ void PrimalDual::Impl::set_matrix() {
   has_matrix = true;
 }
 
+bool PrimalDual::Impl::factorise(const Eigen::VectorXd& x) {
+  if (!smooth) return matrix.factorise();
+  return matrix.factorise(&smooth->hessian(x, false)) || matrix.factorise(&smooth->hessian(x, true));
+}
+
 // The direction of Newton's method in `solution`, its D dx in `change`: right side by `force`, `missed` and `gap`.
 // `anew`: not by the factor of the iteration before. False where the matrix is not positive.
-bool PrimalDual::Impl::solve(bool anew, ProjectionReport& report) {
+bool PrimalDual::Impl::solve(const Eigen::VectorXd& x, bool anew, ProjectionReport& report) {
   each_row([&](int r) { row_force.col(r) = -slope[r] * missed[r] * y.col(r); });
   for (int p = 0; p < places(); ++p) row_force.col(strains() + p) = -gap.col(p) / place_compliance(p);
   rhs = -force;
@@ -236,9 +246,9 @@ bool PrimalDual::Impl::solve(bool anew, ProjectionReport& report) {
   if (anew) {
     set_matrix();
     solution.setZero();
-    factored = places() > 0 || matrix.stiffening() > easy ||
+    factored = smooth || places() > 0 || matrix.stiffening() > easy ||
                !matrix.conjugate_gradients(rhs, solution, gradient_tolerance * options.force_residual, most_gradients);
-    if (factored && !matrix.factorise()) return false;
+    if (factored && !factorise(x)) return false;
     (factored ? report.factor_seconds : report.solve_seconds) += since(start);
   }
   if (factored) {
@@ -271,7 +281,7 @@ bool PrimalDual::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& 
     const bool anew = k == 0 || !factored || left > near || (old && left > gain * last);
     old = !anew;
     last = left;
-    if (!solve(anew, report)) return false;
+    if (!solve(x, anew, report)) return false;
     ++report.iterations;
     const double turn = strains() > 0 ? std::sqrt(change.leftCols(strains()).colwise().squaredNorm().maxCoeff()) : 0;
     const double share = std::min(1.0, longest_turn / turn);
@@ -298,6 +308,7 @@ double PrimalDual::Impl::merit(const Eigen::Ref<const Eigen::VectorXd>& x) {
   for (int p = 0; p < places(); ++p)
     sum += mu.col(p).dot(gap.col(p)) + 0.5 / place_compliance(p) * gap.col(p).squaredNorm();
   for (int r = 0; r < strains(); ++r) sum += 0.5 * friction[r] * std::pow(strain[r] - strain_before[r], 2);
+  if (smooth) sum += smooth->value(x);
   return sum + limit_energy();
 }
 
@@ -321,7 +332,7 @@ bool PrimalDual::Impl::search(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& r
       slope[r] = takes_part(r) ? law(r).stiffness(strain[r]) : 0;
       missed[r] = 0;
     });
-    if (!solve(true, report)) return false;
+    if (!solve(x, true, report)) return false;
     ++report.iterations;
     const double down = -rhs.dot(solution);
     double share = 1, there = 0;
@@ -352,17 +363,7 @@ ProjectionReport PrimalDual::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eige
   const double tau2 = s.tau * s.tau;
   s.at(t - dt);
   s.measure(start, report);
-  if (forces.strain.size() != s.strains()) {
-    forces.strain.setZero(s.strains());
-    for (int r = 0; r < s.strains(); ++r)
-      if (s.takes_part(r)) forces.strain[r] = s.law(r).multiplier(s.strain[r]);
-  }
-  if (forces.place.cols() != s.places()) forces.place.setZero(3, s.places());
-  s.lambda = forces.strain;
-  s.mu = forces.place;
-  s.friction.setZero();
-  s.memory.strain_impulses.setZero();
-  s.memory.place_multipliers.setZero();
+  s.take(forces);
   s.act(0.5 * dt * dt);
   s.held.setZero();
   s.add_forces_of_rows(s.held);  // J0^T lambda0
@@ -398,6 +399,62 @@ ProjectionReport PrimalDual::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eige
   forces.place = s.mu;
   report.energy = s.limit_energy();
   report.converged = report.converged && solved;
+  return report;
+}
+
+void PrimalDual::Impl::take(ConstraintForces& forces) {
+  if (forces.strain.size() != strains()) {
+    forces.strain.setZero(strains());
+    for (int r = 0; r < strains(); ++r)
+      if (takes_part(r)) forces.strain[r] = law(r).multiplier(strain[r]);
+  }
+  if (forces.place.cols() != places()) forces.place.setZero(3, places());
+  lambda = forces.strain;
+  mu = forces.place;
+  friction.setZero();
+  memory.strain_impulses.setZero();
+  memory.place_multipliers.setZero();
+}
+
+void PrimalDual::add_forces(const Eigen::VectorXd& x, double t, ConstraintForces& forces, Eigen::VectorXd& f) {
+  ProjectionReport unused;
+  impl_->at(t);
+  impl_->measure(x, unused);
+  impl_->take(forces);
+  impl_->act(1);
+  impl_->add_forces_of_rows(f);
+}
+
+ProjectionReport PrimalDual::minimise(Eigen::VectorXd& x, const Eigen::VectorXd& guess, double tau, double t,
+                                      SmoothEnergy& smooth, double reference, ConstraintForces& forces) {
+  Impl& s = *impl_;
+  ProjectionReport report;
+  s.smooth = &smooth;
+  s.has_matrix = false;
+  s.tau = tau;
+  s.guess = guess;
+  s.reference = reference;
+  s.rounding = 0;
+  for (int k = 0; k < s.mass.size(); ++k) s.rounding += s.mass[k] * x.segment<3>(3 * k).squaredNorm();
+  s.rounding = place_rounding * std::sqrt(s.rounding) / (tau * tau);
+  s.at(t);
+  s.measure(x, report);
+  s.take(forces);
+  const Eigen::VectorXd was = x;
+  bool solved = s.iterate(x, report);
+  if (!solved) {
+    x = was;
+    solved = s.search(x, report) && s.iterate(x, report);
+  }
+  forces.strain = s.lambda;
+  forces.place = s.mu;
+  s.memory.strain_impulses.setZero();
+  s.memory.place_multipliers.setZero();
+  s.act(1);  // forces; the caller makes impulses of them
+  s.memory.strain_multipliers = s.lambda;
+  report.energy = s.limit_energy();
+  report.converged = report.converged && solved;
+  s.smooth = nullptr;
   return report;
 }
 
@@ -453,8 +510,8 @@ double PrimalDual::Impl::limit_energy() {
 }
 
 PrimalDual::PrimalDual(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
-                       const PrimalDualOptions& options)
-    : impl_(std::make_unique<Impl>(map, node_mass, std::move(rows), options)) {}
+                       const PrimalDualOptions& options, const BlockPattern* added)
+    : impl_(std::make_unique<Impl>(map, node_mass, std::move(rows), options, added)) {}
 PrimalDual::~PrimalDual() = default;
 
 ProjectionReport PrimalDual::project(Eigen::Ref<Eigen::VectorXd> x, double t) {

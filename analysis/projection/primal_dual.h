@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <memory>
 
+#include "analysis/linear/block_matrix.h"
 #include "analysis/map/affine_map.h"
 #include "analysis/projection/constraint_solver.h"
 #include "analysis/projection/limit_law.h"
@@ -20,6 +21,16 @@ struct PrimalDualOptions {
   // this part of the largest strain, and of what the law leaves to the limit.
   double force_residual = 1e-3, law_residual = 1e-3, wall_residual = 0.05;
   int max_iterations = 50;
+};
+
+// What acts on the nodes besides rows, where that is implicit too.
+class SmoothEnergy {
+ public:
+  virtual ~SmoothEnergy() = default;
+  virtual double value(const Eigen::VectorXd& x) = 0;                           // J
+  virtual void add_gradient(const Eigen::VectorXd& x, Eigen::VectorXd& g) = 0;  // N
+  // On the pattern given to PrimalDual; `positive`: without what makes it indefinite.
+  virtual const BlockMatrix& hessian(const Eigen::VectorXd& x, bool positive) = 0;
 };
 
 // Rows must have a stiffness. The cloth's own forces act by velocity Verlet, the rows' by the trapezoidal rule: with
@@ -40,14 +51,22 @@ class PrimalDual final : public ConstraintSolver {
  public:
   // Throws SolverError where a node has no mass, a strain row has no stiffness, or a place row touches only fixed
   // control points.
+  // `added`: the pattern of what minimise() adds; must outlive it.
   PrimalDual(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
-             const PrimalDualOptions& options = {});
+             const PrimalDualOptions& options = {}, const BlockPattern* added = nullptr);
   ~PrimalDual() override;
 
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) override;  // FastProjection's
   ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
                         const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) override;
   bool end_velocity() const override { return true; }
+  // f += J^T of `forces` at x and time t; memory() then holds them as if a step of 1 s had ended there.
+  void add_forces(const Eigen::VectorXd& x, double t, ConstraintForces& forces, Eigen::VectorXd& f);
+  // x from where it is to the least of |x - guess|^2_M / (2 tau^2) + energy of the limit + `smooth`, place rows held,
+  // at time t. `forces` are the first guess and the answer; `reference`: |M^-1/2 force| that what is left is compared
+  // with.
+  ProjectionReport minimise(Eigen::VectorXd& x, const Eigen::VectorXd& guess, double tau, double t,
+                            SmoothEnergy& smooth, double reference, ConstraintForces& forces);
   void settle(Eigen::Ref<Eigen::VectorXd> v, double t) override;
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
   double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;

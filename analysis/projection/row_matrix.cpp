@@ -32,7 +32,7 @@ void multiply(const SymmetricBlock& b, const double* v, double* out) {
 
 }  // namespace
 
-RowMatrix::RowMatrix(const CompressedRows& rows, const Eigen::VectorXd& mass)
+RowMatrix::RowMatrix(const CompressedRows& rows, const Eigen::VectorXd& mass, const BlockPattern* added)
     : blocks(static_cast<std::size_t>(rows.size())),
       rows_(&rows),
       mass_(&mass),
@@ -45,17 +45,18 @@ RowMatrix::RowMatrix(const CompressedRows& rows, const Eigen::VectorXd& mass)
     for (int e = rows.start[r]; e < rows.start[r + 1]; ++e) sum += rows.value[e], size += std::abs(rows.value[e]);
     free_ = free_ && std::abs(sum) <= 1e-10 * size;
   }
-  make_pattern();
+  make_pattern(added);
   factor_ = std::make_unique<Cholesky>(pattern_);
   for (Eigen::VectorXd* v : {&residual_, &scaled_, &direction_, &image_}) v->resize(3 * mass.size());
 }
 
-void RowMatrix::make_pattern() {
+void RowMatrix::make_pattern(const BlockPattern* added) {
   const int nodes = static_cast<int>(mass_->size());
   std::vector<std::vector<int>> near(
       static_cast<std::size_t>(nodes));  // itself and larger numbers with a row in common
   for (int j = 0; j < nodes; ++j) near[j].push_back(j);
   for_pairs(*rows_, [&](int first, int second) { near[first].push_back(second); });
+  for (int j = 0; added && j < nodes; ++j) near[j].insert(near[j].end(), added->rows(j).begin(), added->rows(j).end());
   pattern_.column_start.push_back(0);
   for (int j = 0; j < nodes; ++j) {
     std::sort(near[j].begin(), near[j].end());
@@ -66,10 +67,12 @@ void RowMatrix::make_pattern() {
       pattern_.column_start.push_back(static_cast<int>(pattern_.row.size()));
     }
   }
-  for_pairs(*rows_, [&](int first, int second) {
-    const auto at = std::lower_bound(near[first].begin(), near[first].end(), second);
-    below_.push_back(static_cast<int>(at - near[first].begin()));
-  });
+  const auto below = [&](int column, int row) {
+    return static_cast<int>(std::ranges::lower_bound(near[column], row) - near[column].begin());
+  };
+  for_pairs(*rows_, [&](int first, int second) { below_.push_back(below(first, second)); });
+  for (int j = 0; added && j < nodes; ++j)
+    for (const int i : added->rows(j)) added_below_.push_back(below(j, i));
   values_.resize(pattern_.row.size());
 }
 
@@ -103,7 +106,7 @@ void RowMatrix::gather(const Eigen::Ref<const Eigen::VectorXd>& v, Eigen::Matrix
   });
 }
 
-bool RowMatrix::factorise() {
+bool RowMatrix::factorise(const BlockMatrix* added) {
   std::fill(values_.begin(), values_.end(), 0.0);
   // Column b of the block that many below a node's own, its row 0 (in the own block, rows from b on).
   const auto column = [&](int node, int lower, int b) {
@@ -131,6 +134,14 @@ bool RowMatrix::factorise() {
         y[1] += w * b.yy, y[2] += w * b.yz, z[2] += w * b.zz;
       }
   }
+  for (int j = 0; added && j < mass_->size(); ++j)
+    for (int slot = added->pattern().first_slot(j); slot < added->pattern().first_slot(j + 1); ++slot) {
+      const double* const block = added->block(slot);
+      for (int b = 0; b < 3; ++b) {
+        double* const to = column(j, added_below_[slot], b);
+        for (int a = added_below_[slot] == 0 ? b : 0; a < 3; ++a) to[a] += block[3 * a + b];
+      }
+    }
   return factor_->factorise(values_);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The matrix of constraint rows over nodes, scale M + sum_r d_r^T d_r x B_r with a symmetric 3 x 3 block B_r for each
-// row: applied row by row, solved by conjugate gradients or by a factor.
+// row, and what else acts on the nodes: applied row by row, solved by conjugate gradients or by a factor.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/constraint/composed_rows.h"
+#include "analysis/linear/block_matrix.h"
 #include "analysis/linear/cholesky.h"
 #include "analysis/parallel/workers.h"
 
@@ -31,7 +32,8 @@ struct SymmetricBlock {
 // `rows` and `mass` must outlive it. The pattern is analysed in the constructor, once.
 class RowMatrix {
  public:
-  RowMatrix(const CompressedRows& rows, const Eigen::VectorXd& mass);
+  // `added`: pattern of a matrix over nodes that factors add; must outlive it. Null: none.
+  RowMatrix(const CompressedRows& rows, const Eigen::VectorXd& mass, const BlockPattern* added = nullptr);
 
   double scale = 1;                    // of the masses
   std::vector<SymmetricBlock> blocks;  // one a row
@@ -41,7 +43,7 @@ class RowMatrix {
   void gather(const Eigen::Ref<const Eigen::VectorXd>& v, Eigen::Matrix3Xd& out) const;
 
   // By a factor of the matrix as it is now: false where it is not positive. Then any number of solutions.
-  bool factorise();
+  bool factorise(const BlockMatrix* added = nullptr);
   void solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) { factor_->solve(rhs, x); }
   // Conjugate gradients from x on with the nodes' own blocks as preconditioner, until the residual in the
   // preconditioner's norm is `tolerance` of the right side's; false where that takes more than `most` iterations. What
@@ -54,7 +56,7 @@ class RowMatrix {
   std::size_t factor_nonzeros() const { return factor_ ? factor_->factor_nonzeros() : 0; }
 
  private:
-  void make_pattern();
+  void make_pattern(const BlockPattern* added);
   void apply(const Eigen::VectorXd& v, Eigen::VectorXd& out);
   void invert_nodes();
 
@@ -63,7 +65,8 @@ class RowMatrix {
   CompressedRows at_node_;  // D^T
   SparsePattern pattern_;
   std::vector<double> values_;
-  std::vector<int> below_;  // of each pair of a row's entries (first <= second): how many blocks below the diagonal's
+  // How many blocks below the diagonal's: of each pair of a row's entries (first <= second), of each block of `added`.
+  std::vector<int> below_, added_below_;
   std::unique_ptr<Cholesky> factor_;
   bool free_ = true;  // no row feels a translation
   Workers* workers_ = nullptr;

@@ -61,7 +61,8 @@ void add_constraint_forces(const MechanicalSystem& system, double dt, Vector& f,
   }
 }
 
-// Work that moved pins do on the cloth between two states: their force against what the cloth pulls, trapezoidal.
+}  // namespace
+
 double motion_work(const MechanicalSystem& system, const DynamicState& from, const DynamicState& to, StepWork& work) {
   const AffineMap& map = *system.map;
   const auto moved = [&](int i) -> Eigen::Vector3d { return to.q.segment<3>(3 * i) - from.q.segment<3>(3 * i); };
@@ -84,8 +85,6 @@ double motion_work(const MechanicalSystem& system, const DynamicState& from, con
       sum -= e.value() * work.force.segment<3>(3 * i).dot(moved(map.fixed()[static_cast<std::size_t>(e.col())]));
   return sum;
 }
-
-}  // namespace
 
 void initialise(const MechanicalSystem& system, DynamicState& state) {
   state.q.resize(3 * system.map->control_points());

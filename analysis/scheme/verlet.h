@@ -86,6 +86,9 @@ struct StepWork {
 StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, StepWork& work);
 StepReport step(const MechanicalSystem& system, DynamicState& state, double dt);
 
+// Work that moved pins do on the cloth between two states [J]: their force against what the cloth pulls, trapezoidal.
+double motion_work(const MechanicalSystem& system, const DynamicState& from, const DynamicState& to, StepWork& work);
+
 // Force that each fixed control point and each place row exerts on the cloth [N] at the state's time, dt being the last
 // step's. A constraint's force is -J^T lambda / dt^2. Exact at rest: the sum balances the dead loads.
 struct Reactions {

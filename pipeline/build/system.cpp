@@ -115,6 +115,10 @@ std::string held_twice(const Scene& scene, const std::vector<Candidate>& candida
   return what + "; the first one is left out";
 }
 
+PrimalDualOptions limit_options(const StrainLimit& limit) {
+  return {.weft = limit.weft, .warp = limit.warp, .tolerance = limit.tolerance, .max_iterations = limit.max_iterations};
+}
+
 }  // namespace
 
 double extent(const ClothPanel& panel) {
@@ -141,6 +145,10 @@ double default_limit_stiffness(const Build& build, int panel) {
   const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
   const double own = std::max(shell.fabric.membrane.weft, shell.fabric.membrane.warp);
   return reserve * std::max({load / narrowest, own, shell.fabric.density});
+}
+
+StepReport step(const System& system, DynamicState& state, double dt, StepWork& work) {
+  return system.implicit ? system.implicit->step(state, dt, work) : step(system.dynamic, state, dt, work);
 }
 
 std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers) {
@@ -294,16 +302,19 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     if (limit.solver == LimitSolver::lagrange)
       system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
     else if (limit.on && limit.variant == ProjectionVariant::newton)
-      system->projection = std::make_unique<PrimalDual>(*system->map, dynamic.node_mass, std::move(rows),
-                                                        PrimalDualOptions{.weft = limit.weft,
-                                                                          .warp = limit.warp,
-                                                                          .tolerance = limit.tolerance,
-                                                                          .max_iterations = limit.max_iterations});
+      system->projection =
+          std::make_unique<PrimalDual>(*system->map, dynamic.node_mass, std::move(rows), limit_options(limit));
     else
       system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
     system->projection->use_threads(dynamic.workers);
   }
   dynamic.projection = system->projection.get();
+  if (scene.scheme != TimeScheme::verlet) {
+    const ImplicitRule rule = scene.scheme == TimeScheme::backward_euler ? ImplicitRule::backward_euler
+                              : scene.scheme == TimeScheme::bdf2         ? ImplicitRule::bdf2
+                                                                         : ImplicitRule::newmark;
+    system->implicit = std::make_unique<ImplicitScheme>(dynamic, limit_options(limit), rule);
+  }
   return system;
 }
 

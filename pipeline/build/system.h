@@ -8,11 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "analysis/scheme/implicit.h"
 #include "pipeline/build/build.h"
 
 namespace toile {
 
-// Pins, projection, masses. `dynamic` points into the rest, so a System stays where it is made.
+// Pins, projection, masses. `dynamic` and `implicit` point into the rest, so a System stays where it is made.
 struct System {
   System() = default;
   System(const System&) = delete;
@@ -29,7 +30,11 @@ struct System {
   std::unique_ptr<AffineMap> map;
   std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
   MechanicalSystem dynamic;
+  std::unique_ptr<ImplicitScheme> implicit;  // null: velocity Verlet
 };
+
+// A step of the system's scheme.
+StepReport step(const System& system, DynamicState& state, double dt, StepWork& work);
 
 // Edge of the square whose corners are as far from its middle as the farthest cloth is [m].
 double extent(const ClothPanel& panel);

@@ -300,7 +300,7 @@ int dry_run(Scene scene, bool json, Console& console) {
   const int trial = built.scene.rest ? 5 : static_cast<int>(std::min(5LL, steps));
   const Clock::time_point start = Clock::now();
   StepWork work;
-  for (int k = 0; k < trial; ++k) step(system->dynamic, state, dt, work);
+  for (int k = 0; k < trial; ++k) step(*system, state, dt, work);
   const double per_step = trial > 0 ? since(start) / trial : 0;
   const std::size_t factor = system->projection ? system->projection->factor_nonzeros() : 0;
   const double bytes =

@@ -19,7 +19,8 @@ constexpr double rest_share = 1e-4;  // of the largest panel, of the tolerance o
 // test.
 constexpr double smallest_careful = 1.0 / 16;
 constexpr int first_steps = 10;
-constexpr double pins_per_step = 0.1;  // of the longest span
+constexpr double implicit_step = 1.0 / 60;  // s, where the scene names none
+constexpr double pins_per_step = 0.1;       // of the longest span
 
 }  // namespace
 
@@ -112,7 +113,7 @@ class Run::Impl {
     result_.watch.exchanged = result_.energy.start;
     result_.control.strain = elastic.strain;
     evaluate_bound();
-    if (scene_.dt) hold_to_bound();
+    if (scene_.dt && !implicit()) hold_to_bound();
     result_.watch.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
   }
 
@@ -144,7 +145,10 @@ class Run::Impl {
   bool at_rest() const { return scene_.rest && result_.relaxation.remaining <= tolerance_; }
   // Before its time: at rest, or at the end of the steps that it may take to get there.
   bool ends_early() const { return at_rest() || (scene_.rest && result_.relaxation.steps >= scene_.rest->max_steps); }
+  // Implicit steps are stable at any size.
+  bool implicit() const { return scene_.scheme != TimeScheme::verlet; }
   void evaluate_bound() {
+    if (implicit()) return;
     StepControl& control = result_.control;
     const double before = result_.bound.dt;
     const int interval = control.bound_every;
@@ -167,7 +171,7 @@ class Run::Impl {
     return limit.on && (limit.solver == LimitSolver::lagrange || limit.variant == ProjectionVariant::paper);
   }
   // A step that the scene names is held to the bound once it has proved too large.
-  bool bounded() const { return !scene_.dt || result_.bound.dt > 0; }
+  bool bounded() const { return !implicit() && (!scene_.dt || result_.bound.dt > 0); }
   double largest_step() const {
     const double planned = planned_step(scene_, result_.bound);
     return scene_.dt && bounded() ? std::min(planned, step_safety * result_.bound.dt) : planned;
@@ -206,7 +210,7 @@ class Run::Impl {
       return;
     }
     for (bool halved = false;; halved = true) {
-      const StepReport report = toile::step(result_.system->dynamic, result_.state, dt, work_);
+      const StepReport report = toile::step(*result_.system, result_.state, dt, work_);
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
       std::string trouble = unmet(report);
@@ -220,7 +224,7 @@ class Run::Impl {
       }
       if (report.finite) std::swap(result_.state, work_.other);
       if (!halved) result_.accepted = RunState(result_);
-      if (!bounded()) hold_to_bound();
+      if (!bounded() && !implicit()) hold_to_bound();
       ++result_.redone_steps;
       result_.control.refuse(!halved);
       result_.watch.trough = result_.watch.balance;
@@ -471,7 +475,8 @@ double rest_tolerance(const Build& build) {
 }
 
 double planned_step(const Scene& scene, const TimeStepBound& bound) {
-  return scene.dt ? *scene.dt : std::min(step_safety * bound.dt, scene.every);
+  if (scene.dt) return *scene.dt;
+  return std::min(scene.scheme == TimeScheme::verlet ? step_safety * bound.dt : implicit_step, scene.every);
 }
 
 std::string describe_cell(const Build& build, const Cell& cell) {

@@ -508,7 +508,19 @@ void read_limit(Table table, Scene& scene) {
 
 void read_solver(Table table, Scene& scene) {
   table.choice("model", {"shell"}, {"hinge", "solid", "spring", "fem"});
-  table.choice("scheme", {"verlet"}, {"newmark", "backward-euler"});
+  constexpr TimeScheme schemes[] = {TimeScheme::verlet, TimeScheme::backward_euler, TimeScheme::bdf2,
+                                    TimeScheme::newmark};
+  std::vector<std::string> names;
+  for (const TimeScheme scheme : schemes) names.emplace_back(name(scheme));
+  if (const auto scheme = table.choice("scheme", names, {}))
+    scene.scheme = schemes[std::ranges::find(names, *scheme) - names.begin()];
+  const StrainLimit& limit = scene.strain_limit;
+  if (scene.scheme != TimeScheme::verlet && limit.on &&
+      (limit.solver != LimitSolver::projection || limit.variant != ProjectionVariant::newton))
+    throw InputError(
+        fmt::format("{}: scheme = \"{}\" takes the strain limit as a law: solver = \"projection\", variant "
+                    "= \"newton\" in [strain_limit]",
+                    table.where(), name(scene.scheme)));
   if (const toml::node* node = table.find("dt")) {
     if (!(node->is_string() && *node->value<std::string>() == "auto")) {
       scene.dt = table.quantity(*node, "dt in [solver]", dimension::time, Range::positive);
@@ -779,6 +791,20 @@ std::span<const FabricPreset> fabric_presets() {
       FabricPreset{"skirt", "skirt of example 4.3(a)", make(50, 0.118, 0.354, 1e-5, 0.8)},
   };
   return presets;
+}
+
+const char* name(TimeScheme scheme) {
+  switch (scheme) {
+    case TimeScheme::verlet:
+      return "verlet";
+    case TimeScheme::backward_euler:
+      return "backward-euler";
+    case TimeScheme::bdf2:
+      return "bdf2";
+    case TimeScheme::newmark:
+      return "newmark";
+  }
+  return "";
 }
 
 }  // namespace toile

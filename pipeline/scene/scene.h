@@ -110,6 +110,9 @@ struct StrainLimit {
   int max_iterations = 50;
 };
 
+enum class TimeScheme { verlet, backward_euler, bdf2, newmark };
+const char* name(TimeScheme scheme);  // "backward-euler", as in scenes and reports
+
 // until = "rest": static equilibrium.
 struct SceneRest {
   std::optional<double> tolerance;  // m that material points may swing when let go; unset: 1e-4 of the largest panel
@@ -147,11 +150,12 @@ struct Scene {
   Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
   Eigen::Vector3d wind{0, 0, 0};         // m/s
   std::optional<double> dt;              // s; unset: chosen from the eigenvalue bound
-  double energy_gain = 0.01;             // allowed unexplained growth of energy, as a share of the energy exchanged
-  double until = 1;                      // s; infinite where `rest` ends the run
-  std::optional<SceneRest> rest;         // set: until the cloth is at rest
-  std::optional<double> time_limit;      // s of wall time for the program; unset: none
-  double every = 1.0 / 30;               // s between frames
+  TimeScheme scheme = TimeScheme::verlet;
+  double energy_gain = 0.01;         // allowed unexplained growth of energy, as a share of the energy exchanged
+  double until = 1;                  // s; infinite where `rest` ends the run
+  std::optional<SceneRest> rest;     // set: until the cloth is at rest
+  std::optional<double> time_limit;  // s of wall time for the program; unset: none
+  double every = 1.0 / 30;           // s between frames
   std::vector<FrameFormat> formats{FrameFormat::vtu};
   HistoryRows history = HistoryRows::frames;
   bool preview = true;

@@ -8,6 +8,7 @@
 #include "analysis/linear/block_matrix.h"
 #include "analysis/linear/cholesky.h"
 #include "analysis/parallel/workers.h"
+#include "analysis/scheme/reduced_matrix.h"
 #include "analysis/shell/shell_model.h"
 #include "geometry/refine.h"
 #include "support/near.h"
@@ -41,6 +42,28 @@ Eigen::MatrixXd dense(const BlockMatrix& matrix) {
     out.col(k) = image;
   }
   return out;
+}
+
+TEST(ReducedMatrix, IsTheMatrixBetweenTheMap) {
+  // Point 1 is fixed, point 3 follows three others, of which it has a block with one; point 4 follows one.
+  AffineMap::Matrix dependence = AffineMap::identity(6);
+  std::vector<Eigen::Triplet<double>> entries{{0, 0, 1},   {1, 1, 1},    {2, 2, 1},   {5, 5, 1},
+                                              {3, 0, 0.7}, {3, 2, -0.4}, {3, 1, 0.7}, {4, 5, 1}};
+  dependence.setFromTriplets(entries.begin(), entries.end());
+  const AffineMap map(dependence, {1}, [](std::size_t, double) { return Eigen::Vector3d(1, 2, 3); });
+  const BlockPattern pattern(6, {{0, 2, 3}, {3, 4, 5}, {1, 2}});
+  BlockMatrix matrix(pattern);
+  Random random(5);
+  for (int slot = 0; slot < pattern.blocks(); ++slot)
+    for (int e = 0; e < 9; ++e) matrix.block(slot)[e] = random();
+  const ReducedMatrix reduced(pattern, map);
+  BlockMatrix out(reduced.pattern());
+  reduced.reduce(matrix, out);
+  Eigen::MatrixXd t = Eigen::MatrixXd::Zero(18, 3 * map.nodes());
+  for (int i = 0; i < 6; ++i)
+    for (AffineMap::Matrix::InnerIterator e(map.free_part(), i); e; ++e)
+      for (int a = 0; a < 3; ++a) t(3 * i + a, 3 * e.col() + a) = e.value();
+  EXPECT_LT((dense(out) - t.transpose() * dense(matrix) * t).norm(), 1e-13 * dense(matrix).norm());
 }
 
 TEST(BlockMatrix, ItsScalarsAreThoseOfItsProducts) {

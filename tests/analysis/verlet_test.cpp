@@ -11,6 +11,7 @@
 #include "analysis/projection/fast_projection.h"
 #include "analysis/projection/lagrange_newton.h"
 #include "analysis/projection/primal_dual.h"
+#include "analysis/scheme/implicit.h"
 #include "support/near.h"
 #include "support/panels.h"
 
@@ -412,6 +413,111 @@ TEST(Verlet, RestartingFromAStateContinuesBitByBit) {
     two.state = one.state;
     run(one, 4e-3, 0.1);
     run(two, 4e-3, 0.1);
+    EXPECT_EQ(one.state.x, two.state.x);
+    EXPECT_EQ(one.state.v, two.state.v);
+  }
+}
+
+constexpr ImplicitRule all_rules[] = {ImplicitRule::backward_euler, ImplicitRule::bdf2, ImplicitRule::newmark};
+
+DynamicState implicit_run(Scene& scene, ImplicitRule rule, double dt, double until, double residual = 1e-3) {
+  ImplicitScheme scheme(scene.system, {}, rule, {.residual = residual});
+  StepWork work;
+  for (int k = 0; k < std::lround(until / dt); ++k) {
+    const StepReport report = scheme.step(scene.state, dt, work);
+    EXPECT_TRUE(report.finite && report.projection.converged) << k;
+  }
+  return scene.state;
+}
+
+TEST(Implicit, FreeFallIsExactBySecondOrderRules) {
+  for (const ImplicitRule rule : all_rules) {
+    Scene scene({.spans = 4, .fabric = without_drag()});
+    const Eigen::VectorXd start = scene.places();
+    implicit_run(scene, rule, 0.05, 0.5);
+    // Backward Euler's speed of each step is that at its end.
+    const double fallen = rule == ImplicitRule::backward_euler ? 0.5 * 0.5 * (0.5 + 0.05) : 0.5 * 0.25;
+    for (int i = 0; i < scene.map.control_points(); ++i)
+      EXPECT_LT(((scene.places() - start).segment<3>(3 * i) - fallen * gravity).norm(), 1e-9);
+  }
+}
+
+TEST(Implicit, DragLeadsToTerminalVelocityAtAnyStep) {
+  for (const ImplicitRule rule : {ImplicitRule::backward_euler, ImplicitRule::bdf2}) {
+    Scene scene({.spans = 4});
+    scene.system.loads.wind = Eigen::Vector3d(1, -2, 0);
+    implicit_run(scene, rule, 0.5, 15);
+    const Fabric fabric;
+    const Eigen::Vector3d terminal = scene.system.loads.wind + gravity * fabric.density / fabric.drag;
+    for (int k = 0; k < scene.map.nodes(); ++k)
+      EXPECT_LT((scene.state.v.segment<3>(3 * k) - terminal).norm(), 1e-4 * terminal.norm());
+  }
+}
+
+// Against small steps of Verlet, of cloth without a limit.
+TEST(Implicit, StepsHaveTheOrderOfTheirRule) {
+  Fabric fabric;
+  fabric.membrane = {.weft = 20, .warp = 20, .shear = 8};
+  fabric.bending.kappa_reg = 3;
+  const Scene::Options options{.spans = 5, .fabric = fabric, .fixed = {0, 6}, .limits = false};
+  Scene fine(options);
+  run(fine, 1e-4, 0.16);
+  const Eigen::VectorXd exact = fine.places();
+  for (const ImplicitRule rule : all_rules) {
+    std::vector<double> error;
+    for (const double dt : {4e-3, 2e-3, 1e-3}) {
+      Scene scene(options);
+      implicit_run(scene, rule, dt, 0.16, 1e-6);
+      error.push_back((scene.places() - exact).norm());
+    }
+    const double order = rule == ImplicitRule::backward_euler ? 0.9 : 1.85;
+    EXPECT_GT(std::log2(error[0] / error[1]), order) << static_cast<int>(rule);
+    EXPECT_GT(std::log2(error[1] / error[2]), order) << static_cast<int>(rule);
+  }
+}
+
+TEST(Implicit, LargeStepsKeepTheLimitAndMakeNoEnergy) {
+  for (const ImplicitRule rule : {ImplicitRule::backward_euler, ImplicitRule::bdf2})
+    for (const double dt : {1.0 / 30, 1.0 / 120}) {
+      Scene scene({.fabric = without_drag(), .fixed = {0, 9}});
+      ImplicitScheme scheme(scene.system, {}, rule);
+      StepWork work;
+      double energy = 0, gained = 0, done = 0;
+      for (int k = 0; k < std::lround(0.8 / dt); ++k) {
+        const StepReport report = scheme.step(scene.state, dt, work);
+        ASSERT_TRUE(report.finite && report.projection.converged) << dt << ' ' << k;
+        EXPECT_LT(report.projection.strain_violation, 0.01);
+        done += report.load_work;
+        energy = report.kinetic_end + report.elastic.total() + report.limit_energy - done;
+        gained = std::max(gained, energy);
+      }
+      EXPECT_GT(done, 0.15);
+      EXPECT_LT(gained, 1e-3 * done) << dt;
+    }
+}
+
+TEST(Implicit, PinsOfAHangingClothCarryItsWeight) {
+  Fabric fabric;
+  fabric.drag = 0.8;
+  for (const ImplicitRule rule : {ImplicitRule::backward_euler, ImplicitRule::bdf2}) {
+    Scene scene({.size = 0.3, .spans = 4, .fabric = fabric, .fixed = {0, 5}, .pins = {{0.5, 0.9}}});
+    const double dt = 0.02;
+    implicit_run(scene, rule, dt, 6);
+    const Reactions pins = reactions(scene.system, scene.state, dt);
+    const Eigen::Vector3d total = pins.fixed.rowwise().sum() + pins.place.rowwise().sum();
+    const double weight = 0.3 * 0.3 * fabric.density * 9.81;
+    EXPECT_LT((total - Eigen::Vector3d(0, 0, weight)).norm(), 1e-3 * weight);
+    EXPECT_GT(pins.place(2, 0), 0.1 * weight);
+  }
+}
+
+TEST(Implicit, RestartingFromAStateContinuesBitByBit) {
+  for (const ImplicitRule rule : all_rules) {
+    Scene one({.spans = 5, .fixed = {0, 6}}), two({.spans = 5, .fixed = {0, 6}});
+    implicit_run(one, rule, 0.01, 0.1);
+    two.state = one.state;
+    implicit_run(one, rule, 0.01, 0.1);
+    implicit_run(two, rule, 0.01, 0.1);
     EXPECT_EQ(one.state.x, two.state.x);
     EXPECT_EQ(one.state.v, two.state.v);
   }

@@ -130,6 +130,18 @@ TEST(Resume, TheLagrangeNewtonEndsWithTheSameBytes) {
 }
 
 // Cloth that stiffens as it is stretched manifold, so that steps are refused.
+TEST(Resume, ImplicitStepsEndWithTheSameBytes) {
+  const Folder folder("resume_implicit");
+  for (const std::string scheme : {"backward-euler", "bdf2", "newmark"}) {
+    const Build b = built(folder, busy_scene(), test::trimmed_sheet("cloth"), {"solver.scheme=" + scheme});
+    const Whole whole = whole_run(b);
+    ASSERT_EQ(whole.result.exit, RunExit::ok) << whole.result.reason;
+    const std::size_t count = whole.checkpoints.size();
+    for (std::size_t k = 0; k < count; k += 1 + count / 5)
+      expect_same_end(resumed_run(b, whole.checkpoints[k]), whole.left, scheme + ", place " + std::to_string(k));
+  }
+}
+
 TEST(Resume, AHalvedStepIsTakenUpAsItWas) {
   const Folder folder("resume_halved");
   const Build b = built(folder, test::scene_text("[[pin]]\nat = \"corner:0,0\"\n[[pin]]\nat = \"corner:1,0\"\n"),

@@ -445,6 +445,28 @@ TEST(Run, APinMovesWhatItHoldsAndLetsItGo) {
   EXPECT_EQ(result.system->place_rows, 0);
 }
 
+// Implicit steps need no bound, and end where small explicit ones do.
+TEST(Run, ImplicitStepsOfAFrameEachEndWhereExplicitOnesDo) {
+  const Folder folder("implicit");
+  test::write_panels(folder / "panel.igs", {test::trimmed_sheet("cloth")});
+  const auto end = [&](const std::string& scheme, const std::string& dt) {
+    const std::vector<std::string> settings{"solver.scheme=" + scheme, "solver.dt=" + dt, "solver.until=0.2",
+                                            "output.every=1/30 s", "output.points=[{ uv = [200, 100] }]"};
+    const Build b =
+        build(parse_scene(test::scene_text("[[pin]]\nat = \"curve:0,2\"\n"), folder / "scene.toml", settings));
+    const RunResult result = run(b);
+    EXPECT_EQ(result.exit, RunExit::ok) << scheme << ": " << result.reason;
+    EXPECT_LE(result.last_projection.strain_violation, 0.01);
+    return std::pair(b.model->state(0, 200, 100, control_points(*result.system, result.state)).position, result.steps);
+  };
+  const auto [exact, many] = end("verlet", "1e-4");
+  for (const auto& [scheme, off] : {std::pair("backward-euler", 0.02), {"bdf2", 0.002}, {"newmark", 0.004}}) {
+    const auto [place, steps] = end(scheme, "1/30 s");
+    EXPECT_LT(steps, 12) << scheme;
+    EXPECT_LT((place - exact).norm(), off) << scheme;
+  }
+}
+
 TEST(Run, StepsAreSmallWherePinsGoFast) {
   const Folder folder("run_fast_pins");
   test::write_panels(folder / "panel.igs", {test::sheet("cloth")});

@@ -179,7 +179,7 @@ TEST(Scene, EverySamplingRuleIsKnownByItsName) {
 TEST(Scene, LaterFeaturesAreRefusedByName) {
   expect_message(11, "solver = \"springs\"", {"not supported by this version", "projection", "lagrange"});
   expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});
-  expect_message(15, "scheme = \"newmark\"", {"not supported by this version", "verlet"});
+  expect_message(15, "scheme = \"newmarc\"", {"unknown scheme", "newmark"});
   expect_message(12, "[[contact_pair]]", {"[[contact_pair]] is not supported by this version"});
 }
 
