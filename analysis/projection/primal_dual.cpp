@@ -135,8 +135,8 @@ struct PrimalDual::Impl {
   double excess(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void set_slopes();
   void set_matrix();
-  bool factorise(const Eigen::VectorXd& x);
-  bool solve(const Eigen::VectorXd& x, bool anew, ProjectionReport& report);
+  bool factorise(const Eigen::Ref<const Eigen::VectorXd>& x);
+  bool solve(const Eigen::Ref<const Eigen::VectorXd>& x, bool anew, ProjectionReport& report);
   bool iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   bool search(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   // Notes down what the rows' forces at the present y add to the impulses.
@@ -230,14 +230,14 @@ void PrimalDual::Impl::set_matrix() {
   has_matrix = true;
 }
 
-bool PrimalDual::Impl::factorise(const Eigen::VectorXd& x) {
+bool PrimalDual::Impl::factorise(const Eigen::Ref<const Eigen::VectorXd>& x) {
   if (!smooth) return matrix.factorise();
   return matrix.factorise(&smooth->hessian(x, false)) || matrix.factorise(&smooth->hessian(x, true));
 }
 
 // The direction of Newton's method in `solution`, its D dx in `change`: right side by `force`, `missed` and `gap`.
 // `anew`: not by the factor of the iteration before. False where the matrix is not positive.
-bool PrimalDual::Impl::solve(const Eigen::VectorXd& x, bool anew, ProjectionReport& report) {
+bool PrimalDual::Impl::solve(const Eigen::Ref<const Eigen::VectorXd>& x, bool anew, ProjectionReport& report) {
   each_row([&](int r) { row_force.col(r) = -slope[r] * missed[r] * y.col(r); });
   for (int p = 0; p < places(); ++p) row_force.col(strains() + p) = -gap.col(p) / place_compliance(p);
   rhs = -force;

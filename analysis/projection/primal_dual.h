@@ -27,10 +27,10 @@ struct PrimalDualOptions {
 class SmoothEnergy {
  public:
   virtual ~SmoothEnergy() = default;
-  virtual double value(const Eigen::VectorXd& x) = 0;                           // J
-  virtual void add_gradient(const Eigen::VectorXd& x, Eigen::VectorXd& g) = 0;  // N
+  virtual double value(const Eigen::Ref<const Eigen::VectorXd>& x) = 0;                           // J
+  virtual void add_gradient(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::VectorXd& g) = 0;  // N
   // On the pattern given to PrimalDual; `positive`: without what makes it indefinite.
-  virtual const BlockMatrix& hessian(const Eigen::VectorXd& x, bool positive) = 0;
+  virtual const BlockMatrix& hessian(const Eigen::Ref<const Eigen::VectorXd>& x, bool positive) = 0;
 };
 
 // Rows must have a stiffness. The cloth's own forces act by velocity Verlet, the rows' by the trapezoidal rule: with

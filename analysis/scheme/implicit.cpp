@@ -14,6 +14,7 @@ namespace toile {
 namespace {
 
 using Vector = Eigen::VectorXd;
+using Places = Eigen::Ref<const Vector>;
 
 // TR-BDF2 with the one gamma whose stages have the same matrix.
 constexpr double gamma = 2 - std::numbers::sqrt2;
@@ -49,27 +50,27 @@ class Smooth final : public SmoothEnergy {
     beta_ = beta;
   }
   // Forces on control points without drag, and what the potentials store.
-  Elastic force(const Vector& x, Vector& q, Vector& f) {
+  Elastic force(const Places& x, Vector& q, Vector& f) {
     system_.map->expand(x, fixed_places_, q, system_.workers);
     const Elastic elastic = internal_force(system_.potentials, q, f, system_.workers);
     f += system_.loads.force;
     return elastic;
   }
 
-  double value(const Vector& x) override {
+  double value(const Places& x) override {
     double sum = force(x, q_, f_).total() - system_.loads.force.dot(q_);
     for (int k = 0; k < system_.map->nodes(); ++k)
       sum += 0.5 * system_.node_drag[k] * beta_ * (velocity(x, k) - system_.loads.wind).squaredNorm();
     return sum;
   }
-  void add_gradient(const Vector& x, Vector& g) override {
+  void add_gradient(const Places& x, Vector& g) override {
     force(x, q_, f_);
     system_.map->reduce(f_, of_nodes_, system_.workers);
     g -= of_nodes_;
     for (int k = 0; k < system_.map->nodes(); ++k)
       g.segment<3>(3 * k) += system_.node_drag[k] * (velocity(x, k) - system_.loads.wind);
   }
-  const BlockMatrix& hessian(const Vector& x, bool positive) override {
+  const BlockMatrix& hessian(const Places& x, bool positive) override {
     system_.map->expand(x, fixed_places_, q_, system_.workers);
     points_.set_zero();
     for (std::size_t k = 0; k < slots_.size(); ++k)
@@ -83,7 +84,7 @@ class Smooth final : public SmoothEnergy {
   const Eigen::Matrix3Xd& fixed_places() const { return fixed_places_; }
 
  private:
-  Eigen::Vector3d velocity(const Vector& x, int k) const {
+  Eigen::Vector3d velocity(const Places& x, int k) const {
     return (x.segment<3>(3 * k) - from_.segment<3>(3 * k)) / beta_;
   }
 

@@ -318,9 +318,11 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   return system;
 }
 
-double pins_move(const System& system, double t, double dt) {
-  const Eigen::Matrix3Xd moved = system.map->fixed_places(t + dt) - system.map->fixed_places(t);
-  double most = moved.cols() > 0 ? moved.colwise().norm().maxCoeff() : 0;
+double pins_move(const System& system, double t, double dt, Eigen::Matrix3Xd& now, Eigen::Matrix3Xd& then) {
+  system.map->fixed_places(t, now);
+  system.map->fixed_places(t + dt, then);
+  double most = 0;
+  for (Eigen::Index k = 0; k < now.cols(); ++k) most = std::max(most, (then.col(k) - now.col(k)).norm());
   if (system.projection)
     for (const PlaceRow& row : system.projection->rows().place)
       most = std::max(most, (row.target(t + dt) - row.target(t)).norm());

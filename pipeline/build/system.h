@@ -49,8 +49,8 @@ double default_limit_stiffness(const Build& build, int panel);
 // rows contradict each other. `workers`: threads of the steps, which must outlive the system; null: the caller's alone.
 std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers = nullptr);
 
-// How far the control points and places that pins move go from t to t + dt at most [m].
-double pins_move(const System& system, double t, double dt);
+// How far the control points and places that pins move go from t to t + dt at most [m]. `now`, `then`: working memory.
+double pins_move(const System& system, double t, double dt, Eigen::Matrix3Xd& now, Eigen::Matrix3Xd& then);
 
 // State that continues control points q with velocities v (3 n each) under this system at time t.
 DynamicState state_from(const System& system, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double t);

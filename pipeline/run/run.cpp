@@ -256,8 +256,9 @@ class Run::Impl {
   }
 
   // Pins that would go far within a step would tear at the cloth beside them before the rest of it moves.
-  double held_to_pins(double dt) const {
-    const double way = pins_move(*result_.system, result_.state.t, dt), allowed = pins_per_step * span_;
+  double held_to_pins(double dt) {
+    const double way = pins_move(*result_.system, result_.state.t, dt, pins_now_, pins_then_),
+                 allowed = pins_per_step * span_;
     return way > allowed ? dt * allowed / way : dt;
   }
 
@@ -419,6 +420,7 @@ class Run::Impl {
   const double span_ = longest_span(build_);
   bool begun_ = false, over_ = false;
   StepWork work_;
+  Eigen::Matrix3Xd pins_now_, pins_then_;
   const Clock::time_point start_ = Clock::now();
 };
 
