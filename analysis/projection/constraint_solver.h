@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a time step asks of whatever meets its constraints: PrimalDual, FastProjection or LagrangeNewton.
+// What a time step asks of whatever meets its constraints: PrimalDual, Substeps, FastProjection or LagrangeNewton.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,21 +23,26 @@ struct ProjectionReport {
   double residual = 0;
   bool damped = false;        // the Lagrange Newton found no solution: projected instead, which damps
   int worst_row = -1;         // strain row with the largest violation
+  double tightened = 0;       // J, energy of the limits by rows that grew stiffer in the step
+  double within = 1;          // part of the strain rows, by area, that meets its limit: where a percentile is held
   double energy = 0;          // J, of the limit laws at the end
   double factor_seconds = 0;  // wall time of the numeric factorisations
   double solve_seconds = 0;   // and of the solutions by them
 };
 void fields(auto& archive, Like<ProjectionReport> auto& r) {
-  archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.energy);
+  archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.within, r.energy,
+          r.tightened);
 }
 
 // Constraint forces at one time: where a solver goes on from. Empty where there were none.
 struct ConstraintForces {
   Eigen::VectorXd strain;  // N m, per strain row
   Eigen::Matrix3Xd place;  // N, per place row
+  // Per strain row: how many times as stiff as at the start it is, and for how long it has been beyond its limit [s].
+  Eigen::VectorXd stiffening, beyond;
 };
 void fields(auto& archive, Like<ConstraintForces> auto& f) {
-  archive(f.strain, f.place);
+  archive(f.strain, f.place, f.stiffening, f.beyond);
 }
 
 // What the last step left behind, for reactions: rows and shapes as below.
@@ -70,6 +75,8 @@ class ConstraintSolver {
   virtual bool end_velocity() const { return false; }
   // Once v is whole, with the cloth's own forces at t too: takes out of it what the next step can't resolve.
   virtual void settle(Eigen::Ref<Eigen::VectorXd>, double) {}
+  // Largest part of the cloth's own stable step that a step should take.
+  virtual double step_share() const { return 1; }
   // How far x is from the constraints, nothing moved.
   virtual ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) = 0;
   // Energy [J] that the constraints store at x; 0 where they are hard.

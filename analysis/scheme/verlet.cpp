@@ -179,7 +179,7 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
   }
   report.finite = report.finite && std::isfinite(report.kinetic) && std::isfinite(report.elastic.total());
   if (!report.finite) return report;
-  report.motion_work = motion_work(system, state, next, work);
+  report.motion_work = motion_work(system, state, next, work) + report.projection.tightened;
   std::swap(state, next);
   return report;
 }

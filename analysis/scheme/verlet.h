@@ -43,7 +43,7 @@ struct StepReport {
   bool at_end = false;      // a solver with end_velocity(): the law below holds at the end
   double load_work = 0;     // J, work of dead loads in the step
   double drag_work = 0;     // J, work of drag (negative: dissipated)
-  double motion_work = 0;   // J, work of moved pins
+  double motion_work = 0;   // J, work of moved pins, and of what tightens rows
   bool finite = true;
   double force_seconds = 0, projection_seconds = 0;  // wall time
 };

@@ -15,6 +15,7 @@
 #include "analysis/projection/fast_projection.h"
 #include "analysis/projection/lagrange_newton.h"
 #include "analysis/projection/primal_dual.h"
+#include "analysis/projection/substeps.h"
 #include "geometry/error.h"
 #include "pipeline/build/pin_reach.h"
 #include "pipeline/build/places.h"
@@ -119,6 +120,15 @@ PrimalDualOptions limit_options(const StrainLimit& limit) {
   return {.weft = limit.weft, .warp = limit.warp, .tolerance = limit.tolerance, .max_iterations = limit.max_iterations};
 }
 
+std::vector<TensorNet> nets_of(const Build& build) {
+  std::vector<TensorNet> nets;
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const NurbsSurface& net = build.panels[k].face.surface;
+    nets.push_back({build.model->first_point(static_cast<int>(k)), net.count_u(), net.count_v()});
+  }
+  return nets;
+}
+
 }  // namespace
 
 double extent(const ClothPanel& panel) {
@@ -138,13 +148,14 @@ double limit_stiffness(const Build& build, int panel) {
 double default_limit_stiffness(const Build& build, int panel) {
   const Scene& scene = build.scene;
   const StrainLimit& limit = scene.strain_limit;
-  constexpr double reserve = 10;
+  // Substeps have no wall that takes over where loads gather.
+  const double reserve = 10, share = limit.solver == LimitSolver::substeps ? 100 : 10;
   const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
   double load = shell.fabric.density * scene.gravity.norm() * extent(shell);
   for (const SceneTraction& traction : scene.tractions) load = std::max(load, traction.force.norm());
   const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
   const double own = std::max(shell.fabric.membrane.weft, shell.fabric.membrane.warp);
-  return reserve * std::max({load / narrowest, own, shell.fabric.density});
+  return std::max({share * load / narrowest, reserve * own, reserve * shell.fabric.density});
 }
 
 StepReport step(const System& system, DynamicState& state, double dt, StepWork& work) {
@@ -280,7 +291,8 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
       means.insert(means.end(), panel.mean_rows.begin(), panel.mean_rows.end());
     rows.strain = select_rows(*build.model, *system->map, system->points, rows.place, means);
     if (means.empty()) system->unbalanced = unbalanced_part(*build.model, *system->map, rows.strain);
-    if (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::newton) {
+    if (limit.solver == LimitSolver::substeps ||
+        (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::newton)) {
       std::vector<double> stiffness;
       for (std::size_t k = 0; k < build.panels.size(); ++k)
         stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
@@ -301,6 +313,13 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     options.max_iterations = limit.max_iterations;
     if (limit.solver == LimitSolver::lagrange)
       system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
+    else if (limit.on && limit.solver == LimitSolver::substeps)
+      system->projection = std::make_unique<Substeps>(*system->map, dynamic.node_mass, std::move(rows),
+                                                      SubstepsOptions{.weft = limit.weft,
+                                                                      .warp = limit.warp,
+                                                                      .tolerance = limit.tolerance,
+                                                                      .percentile = limit.percentile,
+                                                                      .nets = nets_of(build)});
     else if (limit.on && limit.variant == ProjectionVariant::newton)
       system->projection =
           std::make_unique<PrimalDual>(*system->map, dynamic.node_mass, std::move(rows), limit_options(limit));

@@ -288,7 +288,7 @@ int dry_run(Scene scene, bool json, Console& console) {
   for (const std::string& note : built.scene.notes) console.note(note);
   std::unique_ptr<System> system = assemble(built, 0);
   TimeStepBound bound = time_step_bound(*built.model, *system->map, system->dynamic.node_mass, built.start);
-  const double dt = planned_step(built.scene, bound);
+  const double dt = planned_step(built.scene, bound, step_share(*system));
   long long steps = 0;
   std::vector<double> times;  // unknown for a run until rest
   if (!built.scene.rest) times = frame_times(built.scene);

@@ -134,8 +134,9 @@ RunResult run(const Build& build, std::unique_ptr<System> start, const RunHooks&
 RunResult run(const Build& build, RunResult from, const RunHooks& hooks = {});
 void require_time_left(const Build& build, const RunState& state);
 
-// s, before the control's scale.
-double planned_step(const Scene& scene, const TimeStepBound& bound);
+// Part of the stable step that a run takes; the step [s], before the control's scale.
+double step_share(const System& system);
+double planned_step(const Scene& scene, const TimeStepBound& bound, double share);
 
 // "panel 'front', cell (3, 4), u in [0.3, 0.4], v in [0.4, 0.5]".
 std::string describe_cell(const Build& build, const Cell& cell);

@@ -488,9 +488,16 @@ void read_limit(Table table, Scene& scene) {
     limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::newton;
   if (band && limit.variant == ProjectionVariant::paper)
     throw InputError(table.where() + ": variant = \"paper\" has no bands");
+  table.number(limit.percentile, "percentile", dimension::none, Range::positive);
   // "fast" is another word for the projection.
-  if (const auto solver = table.choice("solver", {"projection", "fast", "lagrange"}, {"springs"});
-      solver && *solver == "lagrange") {
+  if (const auto solver = table.choice("solver", {"projection", "fast", "substeps", "lagrange"}, {"springs"});
+      solver && *solver == "substeps") {
+    limit.solver = LimitSolver::substeps;
+    table.refuse("variant", "variant belongs to solver = \"projection\"");
+    if (limit.percentile > 100)
+      table.fail(*table.raw().get("percentile"),
+                 fmt::format("percentile in [strain_limit] is {}, must be at most 100", limit.percentile));
+  } else if (solver && *solver == "lagrange") {
     limit.solver = LimitSolver::lagrange;
     if (band) throw InputError(table.where() + ": solver = \"lagrange\" has no bands");
     for (const char* key : {"stiffness", "variant"})
@@ -498,6 +505,8 @@ void read_limit(Table table, Scene& scene) {
           key,
           fmt::format("{} belongs to solver = \"projection\"; \"lagrange\" holds the limit as hard equalities", key));
   }
+  if (limit.solver != LimitSolver::substeps)
+    table.refuse("percentile", "percentile belongs to solver = \"substeps\"; the others limit every constraint point");
   std::vector<std::string> rules;
   for (const NamedRule& rule : point_rules()) rules.emplace_back(rule.name);
   if (const auto points = table.choice("points", rules, {})) limit.points = *point_rule(*points);

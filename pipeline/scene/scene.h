@@ -94,7 +94,7 @@ struct SceneObstacle {
   std::string where;
 };
 
-enum class LimitSolver { projection, lagrange };
+enum class LimitSolver { projection, substeps, lagrange };
 enum class ProjectionVariant { newton, paper };  // PrimalDual; fast projection, eqs. (29) to (36)
 
 struct StrainLimit {
@@ -108,6 +108,7 @@ struct StrainLimit {
   ProjectionVariant variant = ProjectionVariant::newton;  // of the projection
   double regularisation = 1e-3;                           // the default of ProjectionOptions
   int max_iterations = 50;
+  double percentile = 99.9;  // of the rows' area that substeps are to keep within the limit
 };
 
 enum class TimeScheme { verlet, backward_euler, bdf2, newmark };

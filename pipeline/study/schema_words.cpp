@@ -60,6 +60,8 @@ std::span<const KeyWords> scene_words() {
       {"strain_limit.compress", "Largest compression in weft and warp, bands only"},
       {"strain_limit.stiffness", "Stiffness before the limit (default: by the loads)"},
       {"strain_limit.solver", "How the limit is held (default: projection, also called fast)"},
+      {"strain_limit.percentile",
+       "Part of the rows, by area, that substeps are to keep within the limit, % (default: 99.9)"},
       {"strain_limit.variant", "A law solved by Newton's method, or hard rows projected as in the paper (newton)"},
       {"strain_limit.regularisation", "Added to the diagonal of the matrix of hard rows (default: 1e-3)"},
       {"strain_limit.max_iterations", "Iterations of a step at most (default: 50)"},

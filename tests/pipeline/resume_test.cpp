@@ -129,6 +129,21 @@ TEST(Resume, TheLagrangeNewtonEndsWithTheSameBytes) {
   }
 }
 
+// Rows beyond the limit grow stiffer on the way, which the checkpoint must know.
+TEST(Resume, SubstepsEndWithTheSameBytes) {
+  const Folder folder("resume_substeps");
+  for (const TrimmedSurface& face : {test::sheet("cloth"), test::trimmed_sheet("cloth")}) {
+    const Build b = built(folder, busy_scene(), face,
+                          {"strain_limit.solver=substeps", "strain_limit.stiffness=15", "solver.until=0.3"});
+    const Whole whole = whole_run(b);
+    ASSERT_NE(whole.result.exit, RunExit::solver_failed) << whole.result.reason;
+    EXPECT_GT(whole.result.state.constraint.stiffening.maxCoeff(), 1);
+    const std::size_t count = whole.checkpoints.size();
+    for (std::size_t k = 0; k < count; k += 1 + count / 10)
+      expect_same_end(resumed_run(b, whole.checkpoints[k]), whole.left, "place " + std::to_string(k));
+  }
+}
+
 // Cloth that stiffens as it is stretched manifold, so that steps are refused.
 TEST(Resume, ImplicitStepsEndWithTheSameBytes) {
   const Folder folder("resume_implicit");

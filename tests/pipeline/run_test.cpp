@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 #include <string>
@@ -531,6 +532,51 @@ TEST(Run, AHopelessStepEndsWithTheReason) {
   EXPECT_TRUE(control_points(*result.system, result.state).allFinite());
   for (const char* part : {"panel 'cloth'", "cell (", "default solver", "pull too hard"}) {
     EXPECT_NE(result.reason.find(part), std::string::npos) << result.reason;
+  }
+}
+
+// Gravity for ever strains what is too soft: a percentile is held or the run says that it isn't.
+TEST(Run, SubstepsHoldThePercentileOrEndAsAFailedCheck) {
+  const Folder folder("percentile");
+  const std::string pins = "[[pin]]\nat = \"corner:0,0\"\n[[pin]]\nat = \"corner:1,0\"\n";
+  const auto ended = [&](const std::string& limit) {
+    std::string text = test::scene_text(pins);
+    text.replace(text.find("tolerance = 0.01"), 16, "solver = \"substeps\"\n" + limit);
+    const Build b = built(folder, test::sheet("cloth"), text);
+    RunResult result = run(b);
+    return std::pair(std::move(result.reason),
+                     report_json(b, result, measure(b, *result.system, result.state, result.dt_last), 0));
+  };
+  const auto [fine, held] = ended("");
+  EXPECT_EQ(held["exit"], "ok") << fine;
+  EXPECT_EQ(held["projection"]["solver"], "substeps");
+  EXPECT_EQ(held["projection"]["percentile"], 99.9);
+  EXPECT_GE(held["projection"]["percentile_held"], 99.9);
+  EXPECT_GT(held["projection"]["iterations_mean"], 1) << "substeps a step";
+  EXPECT_LT(held["projection"]["worst_row"], 0.02);
+  EXPECT_EQ(held["projection"]["worst_row"], held["strain"]["at_constraints_max"]);
+  EXPECT_EQ(held["redone_steps"], 0);
+
+  const auto [why, broken] = ended("stiffness = 20");
+  EXPECT_EQ(broken["exit"], "check");
+  EXPECT_LT(broken["projection"]["percentile_held"], 99.9);
+  EXPECT_NE(why.find("strain_limit.percentile asks for 99.9 %"), std::string::npos) << why;
+  const auto [none, enough] = ended("stiffness = 20\npercentile = 5");
+  EXPECT_EQ(enough["exit"], "ok") << none;
+}
+
+// What moves a pin works on the cloth, by the mean of its force over the substeps.
+TEST(Run, SubstepsKnowTheWorkOfMovedPins) {
+  const Folder folder("substeps_moved");
+  for (const char* at : {"edge:v0", "curve:0,1"}) {
+    std::string text = test::scene_text(std::string("[[pin]]\nat = \"") + at +
+                                        "\"\nmove = { translate = [0, 0, 0.3], start = 0, end = 0.1 }\n");
+    text.replace(text.find("tolerance = 0.01"), 16, "solver = \"substeps\"\npercentile = 50");
+    const RunResult result = run(built(folder, test::sheet("cloth"), text));
+    ASSERT_EQ(result.exit, RunExit::ok) << at << ": " << result.reason;
+    EXPECT_GT(result.energy.motion_work, 0.01) << at;
+    EXPECT_LT(std::abs(result.energy.numerical()), 0.02 * result.energy.motion_work) << at;
+    EXPECT_LT(result.energy.injected, 0.005 * result.energy.motion_work) << at;
   }
 }
 

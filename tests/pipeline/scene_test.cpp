@@ -164,6 +164,10 @@ TEST(Scene, TheLagrangeNewtonTakesHardLimitsOnly) {
   EXPECT_EQ(refusal(11, "solver = \"projection\"\nvariant = \"paper\""), "accepted");
   for (const char* key : {"stiffness = 1000", "variant = \"paper\""})
     EXPECT_NE(refusal(11, std::string("solver = \"lagrange\"\n") + key).find("belongs to solver"), std::string::npos);
+  EXPECT_EQ(refusal(11, "solver = \"substeps\"\npercentile = 99"), "accepted");
+  EXPECT_NE(refusal(11, "solver = \"substeps\"\npercentile = 101").find("at most 100"), std::string::npos);
+  EXPECT_NE(refusal(11, "solver = \"substeps\"\nvariant = \"paper\"").find("belongs to solver"), std::string::npos);
+  EXPECT_NE(refusal(11, "percentile = 99").find("belongs to solver = \"substeps\""), std::string::npos);
   EXPECT_NE(refusal(11, "solver = \"lagrange\"\nmode = \"band\"\nstretch = [0.05, 0.02]").find("no bands"),
             std::string::npos);
 }
