@@ -180,35 +180,61 @@ ImplicitScheme::ImplicitScheme(const MechanicalSystem& system, const PrimalDualO
 ImplicitScheme::~ImplicitScheme() = default;
 
 StepReport ImplicitScheme::step(DynamicState& state, double dt, StepWork& work) {
+  const Clock::time_point start = Clock::now();
+  DynamicState& next = begin(state, dt, work);
+  ProjectionReport found;
+  found.converged = true;
+  if (next.x.size() > 0) found = impl_->advance(state, dt, next.x, next.v);
+  StepReport report = finish(state, dt, work, found);
+  report.projection_seconds = since(start);
+  return report;
+}
+
+StepReport ImplicitScheme::equilibrate(DynamicState& state, double dt, double beta, StepWork& work) {
+  const Clock::time_point start = Clock::now();
+  DynamicState& next = begin(state, dt, work);
+  ProjectionReport found;
+  found.converged = true;
+  if (next.x.size() > 0) found = impl_->minimise(next.x, state.x, state.x, beta, next.t, dt * dt);
+  next.v.setZero();
+  StepReport report = finish(state, dt, work, found);
+  report.projection_seconds = since(start);
+  return report;
+}
+
+// What is left is compared with the loads.
+DynamicState& ImplicitScheme::begin(const DynamicState& state, double dt, StepWork& work) {
   Impl& s = *impl_;
-  const MechanicalSystem& system = s.system;
-  StepReport report;
-  report.dt = dt;
-  report.at_end = true;
-  report.projection.converged = true;
   DynamicState& next = work.other;
   next.t = state.t + dt;
   next.x = state.x;
   next.v = state.v;
-  next.q.resize(3 * system.map->control_points());
-  next.f.resize(next.q.size());
-  const Clock::time_point start = Clock::now();
   s.forces = state.constraint;
-  const auto rows = s.newton.rows().strain.size(), places = s.newton.rows().place.size();
-  s.impulses = {Vector::Zero(static_cast<Eigen::Index>(rows)),
-                Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(places)),
-                Eigen::Matrix3Xd::Zero(3, static_cast<Eigen::Index>(rows))};
-  // What is left is compared with the loads and the inertia of the velocity.
+  const auto rows = static_cast<Eigen::Index>(s.newton.rows().strain.size()),
+             places = static_cast<Eigen::Index>(s.newton.rows().place.size());
+  s.impulses = {Vector::Zero(rows), Eigen::Matrix3Xd::Zero(3, places), Eigen::Matrix3Xd::Zero(3, rows)};
+  Vector loads(3 * s.system.map->nodes());
+  s.system.map->reduce(s.system.loads.force, loads, s.system.workers);
   double size = 0;
-  Vector loads(3 * system.map->nodes());
-  system.map->reduce(system.loads.force, loads, system.workers);
-  for (int k = 0; k < system.node_mass.size(); ++k) size += loads.segment<3>(3 * k).squaredNorm() / system.node_mass[k];
+  for (int k = 0; k < s.system.node_mass.size(); ++k)
+    size += loads.segment<3>(3 * k).squaredNorm() / s.system.node_mass[k];
   s.reference = std::sqrt(size);
-  if (system.node_mass.size() > 0) report.projection = s.advance(state, dt, next.x, next.v);
+  return next;
+}
+
+StepReport ImplicitScheme::finish(DynamicState& state, double dt, StepWork& work, const ProjectionReport& found) {
+  Impl& s = *impl_;
+  const MechanicalSystem& system = s.system;
+  DynamicState& next = work.other;
+  StepReport report;
+  report.dt = dt;
+  report.at_end = true;
+  report.projection = found;
+  report.limit_energy = found.energy;
   next.constraint = s.forces;
   if (system.projection) system.projection->restore(s.impulses);
-  report.limit_energy = report.projection.energy;
-  report.projection_seconds = since(start);
+  next.q.resize(3 * system.map->control_points());
+  next.f.resize(next.q.size());
   s.smooth.at(next.t, next.x, 1);
   report.elastic = s.smooth.force(next.x, next.q, next.f);
   // The cloth's own acceleration, for whoever goes on from here.

@@ -40,8 +40,14 @@ class ImplicitScheme {
 
   // As Verlet's step(): energies at the end, `at_end`.
   StepReport step(DynamicState& state, double dt, StepWork& work);
+  // Towards static equilibrium at t + dt: the least of |x - x0|^2_M / (2 beta^2) + what is stored, from rest to rest.
+  // The larger beta, the nearer. [pseudo-transient continuation: Kelley & Keyes 1998]
+  StepReport equilibrate(DynamicState& state, double dt, double beta, StepWork& work);
 
  private:
+  StepReport finish(DynamicState& state, double dt, StepWork& work, const ProjectionReport& found);
+  DynamicState& begin(const DynamicState& state, double dt, StepWork& work);
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

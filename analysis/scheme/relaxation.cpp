@@ -9,6 +9,8 @@ namespace {
 
 constexpr int steps_per_halt = 10;
 constexpr double smaller_share = 0.7, smallest_share = 0.1;
+// Of the step: inertia of 1e5 steps of a sixtieth of a second moves a swing of a second by 1e-8 of what is left of it.
+constexpr double whole_share = 1e5, grown_share = 8, held_share = 0.02, smallest_held = 1e-8;
 constexpr int least_window = 50, least_trial = 500, windows_at_least = 10;  // of the run so far
 
 // Largest distance between control points that carry cloth.
@@ -36,6 +38,18 @@ void begin(Relaxation& r, bool trial, const Eigen::VectorXd& q) {
 void restart(Relaxation& r) {
   r.remaining = Relaxation().remaining;
   r.from.resize(0);
+}
+
+void approach(const MechanicalSystem& system, const StepWork& work, const DynamicState& state, Relaxation& r) {
+  ++r.steps;
+  r.moved = largest_move(system, work.other.q, state.q);
+  r.remaining = r.dt_share >= whole_share ? r.moved : std::numeric_limits<double>::infinity();
+  r.dt_share = std::min(grown_share * r.dt_share, whole_share);
+}
+
+bool hold_back(Relaxation& r) {
+  r.dt_share *= held_share;
+  return r.dt_share > smallest_held;
 }
 
 bool relax(const MechanicalSystem& system, const StepWork& work, const StepReport& report, double tolerance,

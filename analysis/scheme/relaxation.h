@@ -42,6 +42,12 @@ void fields(auto& archive, Like<Relaxation> auto& r) {
 bool relax(const MechanicalSystem& system, const StepWork& work, const StepReport& report, double tolerance,
            DynamicState& state, Relaxation& relaxation);
 
+// The same for a step of ImplicitScheme::equilibrate, which takes beta = dt dt_share: the share grows as long as steps
+// are accepted; once inertia holds nothing back, `remaining` is how far a step still went.
+void approach(const MechanicalSystem& system, const StepWork& work, const DynamicState& state, Relaxation& relaxation);
+// After one that found no balance: a smaller share; false where that is not tried any more.
+bool hold_back(Relaxation& relaxation);
+
 // Begins the judgement anew, as after a pin was released or moved.
 void restart(Relaxation& relaxation);
 

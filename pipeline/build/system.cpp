@@ -28,6 +28,7 @@ namespace {
 constexpr double smallest_place_pivot = 1e-3, smallest_curve_pivot = 0.2;
 // Starting threads takes some microseconds: with fewer points a step by one is as fast.
 constexpr int least_points_for_threads = 2000;
+constexpr double rest_residual = 1e-7;  // of the loads
 
 // What is held on one side of a seam is held on the other.
 std::vector<int> on_both_sides(const std::vector<int>& control_points, const std::vector<int>& leader) {
@@ -328,11 +329,13 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     system->projection->use_threads(dynamic.workers);
   }
   dynamic.projection = system->projection.get();
-  if (scene.scheme != TimeScheme::verlet) {
+  if (implicit(scene)) {
     const ImplicitRule rule = scene.scheme == TimeScheme::backward_euler ? ImplicitRule::backward_euler
                               : scene.scheme == TimeScheme::bdf2         ? ImplicitRule::bdf2
                                                                          : ImplicitRule::newmark;
-    system->implicit = std::make_unique<ImplicitScheme>(dynamic, limit_options(limit), rule);
+    ImplicitOptions options;
+    if (scene.rest) options.residual = rest_residual;
+    system->implicit = std::make_unique<ImplicitScheme>(dynamic, limit_options(limit), rule, options);
   }
   return system;
 }

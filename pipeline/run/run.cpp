@@ -146,7 +146,9 @@ class Run::Impl {
   // Before its time: at rest, or at the end of the steps that it may take to get there.
   bool ends_early() const { return at_rest() || (scene_.rest && result_.relaxation.steps >= scene_.rest->max_steps); }
   // Implicit steps are stable at any size.
-  bool implicit() const { return scene_.scheme != TimeScheme::verlet; }
+  bool implicit() const { return toile::implicit(scene_); }
+  // Until rest by Newton's method: no motion, but ever larger steps against ever less inertia.
+  bool equilibrating() const { return scene_.rest && scene_.rest->method == RestMethod::newton; }
   void evaluate_bound() {
     if (implicit()) return;
     StepControl& control = result_.control;
@@ -199,7 +201,7 @@ class Run::Impl {
   void advance(double target) {
     if (result_.control.bound_is_due()) evaluate_bound();
     double largest = result_.control.scale * largest_step();
-    if (!scene_.dt) largest *= result_.relaxation.dt_share;
+    if (!scene_.dt && !equilibrating()) largest *= result_.relaxation.dt_share;
     if (!scene_.dt && result_.state.t < pins_done_) largest = held_to_pins(largest);
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
@@ -211,7 +213,9 @@ class Run::Impl {
       return;
     }
     for (bool halved = false;; halved = true) {
-      const StepReport report = toile::step(*result_.system, result_.state, dt, work_);
+      const StepReport report = equilibrating() ? result_.system->implicit->equilibrate(
+                                                      result_.state, dt, dt * result_.relaxation.dt_share, work_)
+                                                : toile::step(*result_.system, result_.state, dt, work_);
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
       std::string trouble = unmet(report);
@@ -229,7 +233,8 @@ class Run::Impl {
       ++result_.redone_steps;
       result_.control.refuse(!halved);
       result_.watch.trough = result_.watch.balance;
-      if (result_.control.exhausted()) {
+      if (equilibrating() && hold_back(result_.relaxation)) continue;
+      if (equilibrating() || result_.control.exhausted()) {
         fail(fmt::format("{}, even with a step of {:.3g} s", trouble, dt));
         return;
       }
@@ -250,10 +255,10 @@ class Run::Impl {
   // A limit with a law has a balance at every step that is small enough; hard rows that depend on each other may not.
   std::string unmet(const StepReport& report) const {
     const ProjectionReport& p = report.projection;
-    if (p.converged || hard_limit() || !scene_.strain_limit.on || by_percentile()) return {};
-    return fmt::format(
-        "the strain limit and the pins find no balance in {} iterations (strain {:.3g}, pins off by {:.3g} m)",
-        p.iterations, p.strain_violation, p.place_violation);
+    if (p.converged || hard_limit() || by_percentile() || (!scene_.strain_limit.on && !implicit())) return {};
+    return fmt::format("{} no balance in {} iterations (strain {:.3g}, pins off by {:.3g} m)",
+                       implicit() ? "the step finds" : "the strain limit and the pins find", p.iterations,
+                       p.strain_violation, p.place_violation);
   }
 
   // Pins that would go far within a step would tear at the cloth beside them before the rest of it moves.
@@ -265,7 +270,9 @@ class Run::Impl {
 
   void relax_after(const StepReport& report) {
     Relaxation& relaxation = result_.relaxation;
-    if (relax(result_.system->dynamic, work_, report, tolerance_, result_.state, relaxation)) {
+    if (equilibrating()) {
+      approach(result_.system->dynamic, work_, result_.state, relaxation);
+    } else if (relax(result_.system->dynamic, work_, report, tolerance_, result_.state, relaxation)) {
       result_.energy.kinetic = 0;
       result_.watch.balance -= report.at_end ? report.kinetic_end : report.kinetic;
       result_.watch.trough = result_.watch.balance;
@@ -489,7 +496,7 @@ double step_share(const System& system) {
 }
 double planned_step(const Scene& scene, const TimeStepBound& bound, double share) {
   if (scene.dt) return *scene.dt;
-  return std::min(scene.scheme == TimeScheme::verlet ? share * bound.dt : implicit_step, scene.every);
+  return std::min(implicit(scene) ? implicit_step : share * bound.dt, scene.every);
 }
 
 std::string describe_cell(const Build& build, const Cell& cell) {

@@ -523,13 +523,6 @@ void read_solver(Table table, Scene& scene) {
   for (const TimeScheme scheme : schemes) names.emplace_back(name(scheme));
   if (const auto scheme = table.choice("scheme", names, {}))
     scene.scheme = schemes[std::ranges::find(names, *scheme) - names.begin()];
-  const StrainLimit& limit = scene.strain_limit;
-  if (scene.scheme != TimeScheme::verlet && limit.on &&
-      (limit.solver != LimitSolver::projection || limit.variant != ProjectionVariant::newton))
-    throw InputError(
-        fmt::format("{}: scheme = \"{}\" takes the strain limit as a law: solver = \"projection\", variant "
-                    "= \"newton\" in [strain_limit]",
-                    table.where(), name(scene.scheme)));
   if (const toml::node* node = table.find("dt")) {
     if (!(node->is_string() && *node->value<std::string>() == "auto")) {
       scene.dt = table.quantity(*node, "dt in [solver]", dimension::time, Range::positive);
@@ -545,10 +538,18 @@ void read_solver(Table table, Scene& scene) {
   }
   if (auto rest = table.table("rest", "rest in [solver]")) {
     if (!scene.rest) table.fail(*table.raw().get("rest"), "rest in [solver] belongs to until = \"rest\"");
+    if (const auto method = rest->choice("method", {"relaxation", "newton"}, {}))
+      scene.rest->method = *method == "newton" ? RestMethod::newton : RestMethod::relaxation;
     scene.rest->tolerance = rest->number("tolerance", dimension::length, Range::positive);
     if (const auto n = rest->integer("max_steps", 1, 1000000000)) scene.rest->max_steps = *n;
     rest->done();
   }
+  const StrainLimit& limit = scene.strain_limit;
+  if (implicit(scene) && limit.on &&
+      (limit.solver != LimitSolver::projection || limit.variant != ProjectionVariant::newton))
+    throw InputError(table.where() +
+                     ": implicit schemes and equilibrium by Newton's method take the strain limit as a law: solver = "
+                     "\"projection\", variant = \"newton\" in [strain_limit]");
   table.number(scene.energy_gain, "energy_gain", dimension::none, Range::positive);
   scene.time_limit = table.number("time_limit", dimension::time, Range::positive);
   table.done();
@@ -800,6 +801,10 @@ std::span<const FabricPreset> fabric_presets() {
       FabricPreset{"skirt", "skirt of example 4.3(a)", make(50, 0.118, 0.354, 1e-5, 0.8)},
   };
   return presets;
+}
+
+bool implicit(const Scene& scene) {
+  return scene.scheme != TimeScheme::verlet || (scene.rest && scene.rest->method == RestMethod::newton);
 }
 
 const char* name(TimeScheme scheme) {

@@ -115,7 +115,9 @@ enum class TimeScheme { verlet, backward_euler, bdf2, newmark };
 const char* name(TimeScheme scheme);  // "backward-euler", as in scenes and reports
 
 // until = "rest": static equilibrium.
+enum class RestMethod { relaxation, newton };
 struct SceneRest {
+  RestMethod method = RestMethod::relaxation;
   std::optional<double> tolerance;  // m that material points may swing when let go; unset: 1e-4 of the largest panel
   int max_steps = 1000000;
 };
@@ -164,6 +166,9 @@ struct Scene {
   std::vector<std::pair<std::string, std::string>> keys;  // as written: "panel.0.grain_deg", "45"
   std::vector<std::string> notes;                         // what was chosen for the user, to be said
 };
+
+// Whether steps are ImplicitScheme's.
+bool implicit(const Scene& scene);
 
 // Reads a scene; `settings` are "key.path=value" with TOML values (a value that isn't TOML is taken as a string) and
 // override or add keys. Throws InputError `scene.toml:12: ...`.

@@ -111,6 +111,7 @@ std::span<const KeyWords> scene_words() {
       {"solver.dt", "Time step, or \"auto\": 0.9 of the stable one (default: auto)"},
       {"solver.until", "Simulated time, or \"rest\": until static equilibrium (default: 1 s)"},
       {"solver.rest", "What counts as rest, with until = \"rest\""},
+      {"rest_in_solver.method", "Swinging until it rests, or Newton's method (default: relaxation)"},
       {"rest_in_solver.tolerance", "How far a point may still move when released (default: 1e-4 of the largest panel)"},
       {"rest_in_solver.max_steps", "Steps at most (default: 1000000)"},
       {"solver.energy_gain", "Energy that may grow without work, as a share of the energy exchanged (default: 0.01)"},

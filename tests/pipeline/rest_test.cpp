@@ -53,6 +53,24 @@ TEST(Rest, AClampedStripEndsAsTheHeavyElastica) {
   }
 }
 
+// Newton's method on the equations of equilibrium: the elastica, and the answer of relaxation.
+TEST(Rest, NewtonsMethodEndsWhereRelaxationDoes) {
+  const Ended strip =
+      end_of(sample("studies/cantilever/scene.toml",
+                    {"panel.0.refine={degree=3,spans=[8,1]}", "solver.rest={tolerance=2e-5,method='newton'}",
+                     "fabric.strip.bending={kappa0=1e4,kappa_reg=1e4,twist=7.848e-4,b0=7.848e-4}"}));
+  ASSERT_EQ(strip.run.exit, RunExit::ok) << strip.run.reason;
+  EXPECT_LT((strip.points[0] - Eigen::Vector3d(0.2 * 0.656354, 0.01, -0.2 * 0.700200)).norm(), 0.01 * 0.2);
+  EXPECT_LT(strip.run.steps, 20);
+  for (const char* scene : {"kidnapped_a/scene.toml", "grid_independence/turned_30.toml"}) {
+    const Ended relaxed = end_of(sample(scene, {"solver.until=rest", "solver.rest.tolerance=1e-5"}));
+    const Ended newton = end_of(sample(scene, {"solver.until=rest", "solver.rest.method=newton"}));
+    ASSERT_EQ(newton.run.exit, RunExit::ok) << newton.run.reason;
+    EXPECT_LT(newton.run.steps, 20) << scene;
+    for (const int k : {0, 1}) EXPECT_LT((newton.points[k] - relaxed.points[k]).norm(), 1e-4) << scene;
+  }
+}
+
 // Drag takes twelve seconds to stop the swing; what is left then is far below a tenth of a millimetre.
 TEST(Rest, TheKidnappedClothEndsWhereDragLeavesIt) {
   const Ended still = end_of(sample("kidnapped_a/scene.toml", {"solver.until=rest"}));
