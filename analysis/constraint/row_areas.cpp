@@ -12,20 +12,6 @@ constexpr double least_area = 1e-3;  // of the panel's mean
 
 using Matrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-// Control points to the nodes and the fixed control points of a map.
-Matrix all_nodes(const AffineMap& map) {
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int i = 0; i < map.control_points(); ++i) {
-    for (AffineMap::Matrix::InnerIterator e(map.free_part(), i); e; ++e)
-      entries.emplace_back(i, static_cast<int>(e.col()), e.value());
-    for (AffineMap::Matrix::InnerIterator e(map.fixed_part(), i); e; ++e)
-      entries.emplace_back(i, map.nodes() + static_cast<int>(e.col()), e.value());
-  }
-  Matrix out(map.control_points(), map.nodes() + static_cast<int>(map.fixed().size()));
-  out.setFromTriplets(entries.begin(), entries.end());
-  return out;
-}
-
 template <class Row>
 Matrix matrix_of(const std::vector<Row>& rows, int control_points, auto scalar_row) {
   std::vector<Eigen::Triplet<double>> entries;
@@ -114,7 +100,7 @@ void weigh_rows(const Body& body, const AffineMap& map, const std::vector<Scalar
                 std::vector<StrainRow>& rows, const RowAreaOptions& options) {
   if (rows.empty()) return;
   const int n = body.point_count();
-  const Matrix nodes = all_nodes(map);
+  const Matrix nodes = map.all();
   const Eigen::MatrixX3d whole = nodes.transpose() * integrals(body);
   for (const bool warp : {false, true}) {
     std::vector<std::size_t> members;

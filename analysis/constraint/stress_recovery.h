@@ -25,20 +25,39 @@ std::vector<ThreadStress> row_stress(const Body& body, const ConstraintRows& row
                                      const Eigen::Ref<const Eigen::VectorXd>& row_force,
                                      const Eigen::Ref<const Eigen::VectorXd>& q);
 
-// Smoothed: each control point takes the mean of the rows under its function, by function and area, weft and warp each;
-// the functions sum them up. What stripes are left is averaged away.
-//   (1) a uniform stress of the rows stays uniform; (2) no value lies outside those of the rows;
-//   (3) springs on a net turned against the threads, and diagonal ones, count for the thread that is nearer.
+// The field that holds the nodes where the membrane's forces do: the fabric's and the limit's together. S in the nodes'
+// functions (weft, warp and shear; pins ignored) makes least
+//   |A S + B r - f|^2 / h^2 + smoothing (integral |grad S|^2 + shear / h^2 integral (S12 - fabric's)^2
+//                                        + rows / h^2 sum area (S along the row's thread - row_stress())^2)
+// where f are the forces on free nodes, A S those of a stress S (by the model's quadrature; y1, y2: threads at q)
+//   (A S)_I = - integral of S1 y1 N_I,1 + S2 y2 N_I,2 + S12 (y1 N_I,2 + y2 N_I,1),
+// B r what place rows may take up, unknown, and h^2 the median of the nodes' areas. Forces on nodes are right however
+// the limit divides a load among its rows; the shear and the rows decide where pins hold both ends of a thread.
+//   (1) a uniform stress comes back as it is; (2) what place rows and fixed control points take up changes nothing;
+//   (3) nor do the areas of the rows, but for what forces leave open.
+// Peaks of a few cells' width are smoothed, at points pinned alone and beside small holes.
 class StressField {
  public:
-  StressField(const Body& body, const ConstraintRows& rows, const std::vector<ThreadStress>& stress);
-  // Weft, warp at a material point; the fabric's own at q where no control point around has a row.
-  std::array<ThreadStress, 2> at(int panel, double u, double v, const Eigen::Ref<const Eigen::VectorXd>& q) const;
+  struct Options {
+    double smoothing = 1e-4, shear = 1e-2, rows = 1e-2;
+  };
+  // `row_forces`: 3 x strain rows [N m], lambda times the direction along which it acted: impulses over dt^2. Place
+  // rows may say the same.
+  StressField(const Body& body, const AffineMap& map, const ConstraintRows& rows,
+              const Eigen::Ref<const Eigen::Matrix3Xd>& row_forces, const Eigen::Ref<const Eigen::VectorXd>& q,
+              const Options& options);
+  StressField(const Body& body, const AffineMap& map, const ConstraintRows& rows,
+              const Eigen::Ref<const Eigen::Matrix3Xd>& row_forces, const Eigen::Ref<const Eigen::VectorXd>& q)
+      : StressField(body, map, rows, row_forces, q, Options()) {}
+  // S1, S2, S12 at a material point [N/m].
+  Eigen::Vector3d second_pk(int panel, double u, double v) const;
+  // Weft, warp at a material point.
+  std::array<ThreadStress, 2> at(int panel, double u, double v) const;
 
  private:
   const Body& body_;
-  // Per direction and control point of all panels: sum of weights, and the weighted stresses.
-  std::array<Eigen::Matrix3Xd, 2> sums_;
+  Eigen::VectorXd q_;        // at which it was recovered
+  Eigen::Matrix3Xd stress_;  // S1, S2, S12 per point of the body
 };
 
 }  // namespace toile

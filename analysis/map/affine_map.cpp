@@ -80,6 +80,18 @@ Matrix AffineMap::identity(int control_points) {
   return m;
 }
 
+AffineMap::Matrix AffineMap::all() const {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < control_points(); ++i) {
+    for (Matrix::InnerIterator e(free_, i); e; ++e) entries.emplace_back(i, static_cast<int>(e.col()), e.value());
+    for (Matrix::InnerIterator e(fixed_part_, i); e; ++e)
+      entries.emplace_back(i, nodes() + static_cast<int>(e.col()), e.value());
+  }
+  Matrix out(control_points(), nodes() + static_cast<int>(fixed_.size()));
+  out.setFromTriplets(entries.begin(), entries.end());
+  return out;
+}
+
 Eigen::Matrix3Xd AffineMap::fixed_places(double t) const {
   Eigen::Matrix3Xd places;
   fixed_places(t, places);

@@ -34,6 +34,8 @@ class AffineMap {
   const Matrix& fixed_part() const { return fixed_part_; }  // G: n_q x n_fixed, g(t) = G (places of the fixed ones)
   const std::vector<int>& fixed() const { return fixed_; }
   const std::vector<int>& node_control_point() const { return node_control_point_; }  // control point that node k is
+  // Control points from nodes and, behind them, fixed control points: [T G].
+  Matrix all() const;
   Eigen::Matrix3Xd fixed_places(double t) const;
   void fixed_places(double t,
                     Eigen::Matrix3Xd& places) const;  // into memory that has the size already: allocates nothing

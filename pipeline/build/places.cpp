@@ -237,7 +237,6 @@ class PathInCells {
 // Adds what holds one stretch of a curve; `required` of its points come first in `out`.
 void hold_along(std::span<const PathPart> parts, const NurbsSurface& surface, HeldPlace& out) {
   constexpr double open_spacing = 1, closed_spacing = 1.15;  // spans
-  constexpr int places = 200;
   const PathInCells path(parts);
   const Eigen::Vector2d a = path.start(), b = path.end();
   double length = 0;
@@ -254,6 +253,7 @@ void hold_along(std::span<const PathPart> parts, const NurbsSurface& surface, He
   out.required += required.size();
   for (int k = 1; k < n; ++k)
     if (std::ranges::find(first, k) == first.end()) out.points.push_back(point(k));
+  const int places = std::max(200, 3 * n);
   for (int k = 0; k < places; ++k) out.curve.push_back(path.at(path.length() * (k + 0.5) / places));
 }
 

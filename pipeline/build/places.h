@@ -52,7 +52,7 @@ struct HeldPlace {
   // Of `points` so many must be held by rows; of the others as many as are independent enough. Of a curve: both ends
   // where it is open, three points where it closes.
   std::size_t required = 0;
-  std::vector<Eigen::Vector2d> curve;  // 200 places along the curve: what the rows don't hold shows as gaps there
+  std::vector<Eigen::Vector2d> curve;  // 200 places or more along the curve: what rows don't hold shows as gaps there
 };
 
 // A panel as addresses see it.

@@ -190,8 +190,8 @@ struct FrameWriter::Impl {
     std::vector<std::vector<Eigen::Vector2d>> raw;
     if (system.strain_rows > 0) {
       const ConstraintRows& rows = system.projection->rows();
+      field.emplace(stress_field(build, system, q, dt));
       const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, q, dt), q);
-      field.emplace(model, rows, stress);
       raw = raw_stress(shown, rows, stress, q);
     }
     for (std::size_t k = 0; k < build.panels.size(); ++k) {
@@ -211,8 +211,8 @@ struct FrameWriter::Impl {
         panel.fields.second_pk.push_back(at.second_pk);
         panel.fields.nominal.push_back(at.nominal);
         if (!field) continue;
-        const auto [weft, warp] = field->at(index, uv.x(), uv.y(), q);
-        panel.fields.second_pk.back().head<2>() << weft.second_pk, warp.second_pk;
+        const auto [weft, warp] = field->at(index, uv.x(), uv.y());
+        panel.fields.second_pk.back() = field->second_pk(index, uv.x(), uv.y());
         panel.fields.nominal.back() << weft.nominal, warp.nominal;
       }
       if (velocity) panel.velocity = build.net(index, *velocity);
@@ -222,7 +222,7 @@ struct FrameWriter::Impl {
         const ConstraintPoint& point = panel.points[i];
         panel.point_strain.emplace_back(model.state(index, point.u, point.v, q).strain.head<2>());
         if (!field) continue;
-        const auto [weft, warp] = field->at(index, point.u, point.v, q);
+        const auto [weft, warp] = field->at(index, point.u, point.v);
         panel.point_stress.emplace_back(weft.nominal, warp.nominal, raw[k][i].x(), raw[k][i].y());
       }
       shown.panels.push_back(std::move(panel));

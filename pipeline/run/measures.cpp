@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "analysis/constraint/stress_recovery.h"
+#include "pipeline/build/places.h"
 
 namespace toile {
 namespace {
@@ -127,6 +128,15 @@ Eigen::VectorXd row_forces(const System& system, const Eigen::VectorXd& q, doubl
   return forces;
 }
 
+StressField stress_field(const Build& build, const System& system, const Eigen::VectorXd& q, double dt) {
+  ConstraintRows rows = system.projection->rows();
+  // A pin along a curve stands for whatever line load its curve may carry.
+  rows.place.insert(rows.place.end(), system.along_curves.begin(), system.along_curves.end());
+  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, system.strain_rows);
+  if (dt > 0) forces = system.projection->strain_impulses() / (dt * dt);
+  return StressField(*build.model, *system.map, rows, forces, q);
+}
+
 Eigen::Vector3d up(const Scene& scene) {
   const double g = scene.gravity.norm();
   return g > 0 ? Eigen::Vector3d(-scene.gravity / g) : Eigen::Vector3d::UnitZ();
@@ -147,6 +157,23 @@ std::vector<GridSample> grid_samples(const Build& build, int n) {
         samples.push_back({static_cast<int>(k), uv, cell * jet.area_scale()});
       }
     }
+  }
+  return samples;
+}
+
+std::vector<GridSample> border_samples(const Build& build) {
+  std::vector<GridSample> samples;
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const BuiltPanel& panel = build.panels[k];
+    for (std::size_t l = 0; l < panel.face.loops.size(); ++l)
+      for (std::size_t c = 0; c < panel.face.loops[l].curves.size(); ++c) {
+        const CurveOnSurface curve(panel.face, panel.topology, static_cast<int>(l), static_cast<int>(c),
+                                   build.rest(static_cast<int>(k)));
+        const std::vector<double> t = curve.breaks(0, 1);
+        for (std::size_t i = 1; i < t.size(); ++i)
+          for (const double at : {t[i - 1], (t[i - 1] + t[i]) / 2})
+            samples.push_back({static_cast<int>(k), curve.uv(at), 0});
+      }
   }
   return samples;
 }
@@ -179,12 +206,21 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   std::vector<double> shear;
   std::optional<StressField> field;
   if (system.strain_rows > 0) {
+    field.emplace(stress_field(build, system, q, dt));
     const ConstraintRows& rows = system.projection->rows();
-    const std::vector<ThreadStress> stress = row_stress(model, rows, row_forces(system, q, dt), q);
-    field.emplace(model, rows, stress);
-    measure_rows(rows, stress, m);
+    measure_rows(rows, row_stress(model, rows, row_forces(system, q, dt), q), m);
     m.unseen_energy = unseen_energy(build, system, q);
   }
+  const auto add_stress = [&](const GridSample& s, const MaterialState& at) {
+    if (field) {
+      const auto [weft, warp] = field->at(s.panel, s.uv.x(), s.uv.y());
+      second_pk.emplace_back(weft.second_pk, warp.second_pk);
+      nominal.emplace_back(weft.nominal, warp.nominal);
+    } else {
+      nominal.push_back(at.nominal);
+      second_pk.emplace_back(at.second_pk.head<2>());
+    }
+  };
   const Eigen::Vector3d axis = up(build.scene);
   m.lowest = std::numeric_limits<double>::max();
   m.highest = std::numeric_limits<double>::lowest();
@@ -196,22 +232,20 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
     const MaterialState at = model.state(s.panel, s.uv.x(), s.uv.y(), q);
     strain.emplace_back(at.strain.head<2>());
     shear.push_back(at.strain[2]);
-    if (field) {
-      const auto [weft, warp] = field->at(s.panel, s.uv.x(), s.uv.y(), q);
-      second_pk.emplace_back(weft.second_pk, warp.second_pk);
-      nominal.emplace_back(weft.nominal, warp.nominal);
-    } else {
-      nominal.push_back(at.nominal);
-      second_pk.emplace_back(at.second_pk.head<2>());
-    }
+    add_stress(s, at);
     reach(at.position);
     const Eigen::Vector3d start = model.state(s.panel, s.uv.x(), s.uv.y(), build.start).position;
     m.largest_deflection = std::max(m.largest_deflection, (at.position - start).norm());
   }
   m.strain = extremes(strain, samples);
   m.shear = shear_extremes(shear, samples);
-  m.nominal = extremes(nominal, samples);
-  m.second_pk = extremes(second_pk, samples);
+  std::vector<GridSample> everywhere = samples;  // the border has no area: it counts for the least and the largest
+  for (const GridSample& s : border_samples(build)) {
+    add_stress(s, model.state(s.panel, s.uv.x(), s.uv.y(), q));
+    everywhere.push_back(s);
+  }
+  m.nominal = extremes(nominal, everywhere);
+  m.second_pk = extremes(second_pk, everywhere);
 
   for (std::size_t k = 0; k < build.panels.size(); ++k) {
     for (const ConstraintPoint& point : build.panels[k].points) {

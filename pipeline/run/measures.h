@@ -11,6 +11,8 @@
 
 namespace toile {
 
+class StressField;
+
 // Points of a 50 x 50 grid (middles of equal parts of the domain) that lie in the material, weighted by rest area.
 struct GridSample {
   int panel = 0;
@@ -18,6 +20,9 @@ struct GridSample {
   double weight = 0;  // m2
 };
 std::vector<GridSample> grid_samples(const Build& build, int per_direction = 50);
+
+// Places along the border of the material: where trims meet knot lines, and the middles between.
+std::vector<GridSample> border_samples(const Build& build);
 
 // Weft and warp of a strain or stress over the grid.
 struct Extremes {
@@ -30,9 +35,10 @@ struct ShearExtremes {
 };
 
 struct StateMeasures {
-  Extremes strain;                         // E11, E22
-  ShearExtremes shear;                     // 2 E12, on the same grid
-  Extremes nominal;                        // N/m, the fabric's and what the strain limit carries, smoothed [eq. 37]
+  Extremes strain;      // E11, E22
+  ShearExtremes shear;  // 2 E12, on the same grid
+  // N/m, the fabric's and what the strain limit carries, recovered [eq. 37]. Min and max also see the cloth's border.
+  Extremes nominal;
   Extremes second_pk;                      // N/m, likewise
   Extremes raw_nominal, raw_second_pk;     // N/m, at the limit's rows as they are, by their areas; 0 without a limit
   double unseen_energy = 0;                // J, of weft and warp strain of the fabric between the limit's rows
@@ -43,7 +49,8 @@ struct StateMeasures {
   double area = 0, mass = 0;               // m2, kg, of the rest
   std::vector<Eigen::Vector3d> points;     // those that the scene asks for [m]
   std::vector<Eigen::Vector3d> reactions;  // per pin: force on the cloth [N]
-  // Per pin along a curve: how far the cloth is from where the pin has it, at most, at 200 places along the curve [m].
+  // Per pin along a curve: how far the cloth is from where the pin has it, at most, at 200 places or more along the
+  // curve [m].
   std::vector<std::optional<double>> gaps;
 };
 // `dt`: of the last step [s], 0 before the first, where nothing is known of the forces of pins and limits.
@@ -56,6 +63,9 @@ std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& sys
 
 // Force [N m] of each strain row in the last step, for row_stress().
 Eigen::VectorXd row_forces(const System& system, const Eigen::VectorXd& q, double dt);
+// The stress that holds the nodes where they are, of fabric and limit together (the fabric's alone before a first
+// step).
+StressField stress_field(const Build& build, const System& system, const Eigen::VectorXd& q, double dt);
 
 // Unit vector against gravity; z where there is none.
 Eigen::Vector3d up(const Scene& scene);

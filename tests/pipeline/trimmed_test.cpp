@@ -10,7 +10,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
+#include <vector>
 
+#include "analysis/constraint/stress_recovery.h"
 #include "pipeline/output/output.h"
 #include "pipeline/panels.h"
 #include "pipeline/run/measures.h"
@@ -69,6 +71,39 @@ TEST(Trimmed, APatchStrainsTheSameUpToItsCorners) {
     for (const double y : {-0.5, -0.48, 0.0, 0.48, 0.5})
       EXPECT_NEAR(still.build.model->state(0, x, y, q).strain[1], 0.0009, 1e-4) << x << ' ' << y;
   for (const char* thread : {"weft", "warp"}) EXPECT_LT(still.report.at("stress").at("unbalanced").at(thread), 1e-6);
+}
+
+// What holds the nodes is known however the limit shares its load among the rows.
+TEST(Trimmed, APatchOnATurnedNetCarriesItsLoadEverywhere) {
+  for (const int degrees : {0, 15, 30})
+    for (const int spans : {10, 20}) {
+      const Still still = at_rest({.degrees = degrees, .spans = spans});
+      ASSERT_EQ(still.run.exit, RunExit::ok) << degrees << ' ' << spans << still.run.reason;
+      const Extremes& stress = still.measures.nominal;
+      EXPECT_NEAR(stress.min[1], 1, 0.015) << degrees << ' ' << spans;
+      EXPECT_NEAR(stress.max[1], 1, 0.015) << degrees << ' ' << spans;
+    }
+}
+
+TEST(Trimmed, ClothOnATurnedNetCarriesItsOwnWeight) {
+  for (const int degrees : {15, 30})
+    for (const int spans : {10, 20}) {
+      const Still still = at_rest({.degrees = degrees, .spans = spans, .more = "[load]\ngravity = [0, -9.81, 0]\n"});
+      ASSERT_EQ(still.run.exit, RunExit::ok) << degrees << ' ' << spans << still.run.reason;
+      const Eigen::VectorXd q = control_points(*still.run.system, still.run.state);
+      const StressField field = stress_field(still.build, *still.run.system, q, still.run.dt_last);
+      double least = 0, most = 0;
+      std::vector<GridSample> samples = grid_samples(still.build);
+      for (const GridSample& s : border_samples(still.build)) samples.push_back(s);
+      for (const GridSample& s : samples) {
+        const double y = still.build.rest(0)(s.uv.x(), s.uv.y()).y();
+        const double error = field.at(0, s.uv.x(), s.uv.y())[1].nominal - 0.117 * 9.81 * (y + 0.5);
+        least = std::min(least, error);
+        most = std::max(most, error);
+      }
+      EXPECT_GT(least, -0.05) << degrees << ' ' << spans;
+      EXPECT_LT(most, 0.05) << degrees << ' ' << spans;
+    }
 }
 
 // A disc of radius 0.45 m with a round hole of radius 0.1 m, held along the hole, after a fall of a quarter of a
