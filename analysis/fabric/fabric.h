@@ -14,6 +14,7 @@ struct Fabric {
     double weft = 11.7;         // N/m
     double warp = 11.7;         // N/m
     double shear = 4.68;        // N/m, on 2 E12
+    double coupling = 0;        // N/m, of weft's stress on warp's strain and the other way; the paper's law has none
   } membrane;
   struct Bending {            // eq. (9), regularised
     double b0 = 3.3e-3;       // N m (moment per length over curvature)
@@ -21,11 +22,16 @@ struct Fabric {
     double kappa_reg = 0.03;  // 1/m, below which the moment becomes linear; makes the slope at 0 finite
     double twist = 0;         // N m, energy twist * kappa12^2 per area; the paper's law has none. A linear law with
                               // twist = b0 is the isotropic plate without lateral contraction
+    double coupling = 0;      // N m, of weft's moment on warp's curvature and the other way
   } bending;
   double drag = 0.351;    // kg/(m2 s), force per area against the velocity relative to the wind
   double friction = 0.3;  // read and kept for scenes with contact
   RestCurvature rest_curvature = RestCurvature::panel;
 };
+
+// The classical isotropic shell of Young's modulus E [Pa], Poisson's ratio nu and a thickness [m], linear in strain and
+// curvature: E t / (1 - nu^2) and E t^3 / 12 (1 - nu^2), nu times that across.
+Fabric isotropic(double youngs_modulus, double poissons_ratio, double thickness);
 
 // Energy per area, moment per length and slope of eq. (9), regularised: the square-root branch uses
 // (kappa^2 + kappa_reg^2)^(1/4), the linear branch continues it with the same energy and moment at kappa0.

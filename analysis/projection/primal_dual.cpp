@@ -282,6 +282,10 @@ bool PrimalDual::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& 
     old = !anew;
     last = left;
     if (!solve(x, anew, report)) return false;
+    // What is left of stiff cloth under small loads may be rounding of its own forces: then no step is left either.
+    if (smooth && k > 0 && report.converged &&
+        solution.lpNorm<Eigen::Infinity>() <= 10 * place_rounding * x.lpNorm<Eigen::Infinity>())
+      return true;
     ++report.iterations;
     const double turn = strains() > 0 ? std::sqrt(change.leftCols(strains()).colwise().squaredNorm().maxCoeff()) : 0;
     const double share = std::min(1.0, longest_turn / turn);

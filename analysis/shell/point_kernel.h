@@ -54,12 +54,14 @@ struct PointLaw {
       : weft(fabric.membrane.weft),
         warp(fabric.membrane.warp),
         shear(fabric.membrane.shear),
+        coupling(fabric.membrane.coupling),
         twist(fabric.bending.twist),
+        bending_coupling(fabric.bending.coupling),
         guard(std::max(weft, warp)),
         membrane(weft > 0 || warp > 0 || shear > 0),
         weft_warp_bending(fabric.bending.b0 > 0),
         bending(fabric.bending) {}
-  double weft, warp, shear, twist;
+  double weft, warp, shear, coupling, twist, bending_coupling;
   double guard;  // N/m, b
   bool membrane, weft_warp_bending;
   BendingLaw bending;
@@ -128,7 +130,9 @@ inline PointEnergy<Real> energy_gradient(const PointLaw& law, const PointJet<Rea
   g.x1 = g.x2 = g.x11 = g.x22 = g.x12 = zero;
   if (law.membrane) {
     const Real E11 = 0.5 * (dot(x.x1, x.x1) - 1.0), E22 = 0.5 * (dot(x.x2, x.x2) - 1.0), g12 = dot(x.x1, x.x2);
-    const Real S11 = law.weft * E11, S22 = law.warp * E22, S12 = law.shear * g12;
+    Real S11 = law.weft * E11, S22 = law.warp * E22;
+    const Real S12 = law.shear * g12;
+    if (law.coupling != 0) S11 = S11 + law.coupling * E22, S22 = S22 + law.coupling * E11;
     energy.membrane = 0.5 * (S11 * E11 + S22 * E22 + S12 * g12);
     energy.least = smaller(E11, E22);
     energy.most = larger(E11, E22);
@@ -139,9 +143,14 @@ inline PointEnergy<Real> energy_gradient(const PointLaw& law, const PointJet<Rea
     const SurfaceNormal<Real> n = surface_normal(x);
     Vec3<Real> M = zero;
     if (law.weft_warp_bending) {
-      const BendingTerms<Real> weft = evaluate<Real>(law.bending, dot(n.a3, x.x11) - rest.k11);
-      const BendingTerms<Real> warp = evaluate<Real>(law.bending, dot(n.a3, x.x22) - rest.k22);
+      const Real k11 = dot(n.a3, x.x11) - rest.k11, k22 = dot(n.a3, x.x22) - rest.k22;
+      BendingTerms<Real> weft = evaluate<Real>(law.bending, k11), warp = evaluate<Real>(law.bending, k22);
       energy.bending = weft.energy + warp.energy;
+      if (law.bending_coupling != 0) {
+        energy.bending += law.bending_coupling * k11 * k22;
+        weft.moment = weft.moment + law.bending_coupling * k22;
+        warp.moment = warp.moment + law.bending_coupling * k11;
+      }
       M = weft.moment * x.x11 + warp.moment * x.x22;
       g.x11 = weft.moment * n.a3;
       g.x22 = warp.moment * n.a3;
@@ -171,7 +180,12 @@ inline PointEnergy<Real> energy_hessian(const PointLaw& law, TangentKind kind, c
   if (law.membrane) {
     Real S11 = 0.5 * law.weft * (dot(x.x1, x.x1) - 1.0), S22 = 0.5 * law.warp * (dot(x.x2, x.x2) - 1.0);
     Real S12 = law.shear * dot(x.x1, x.x2);
-    const Real dS11 = law.weft * dot(x.x1, dx.x1), dS22 = law.warp * dot(x.x2, dx.x2);
+    Real dS11 = law.weft * dot(x.x1, dx.x1), dS22 = law.warp * dot(x.x2, dx.x2);
+    if (law.coupling != 0) {
+      const double half = 0.5 * law.coupling;
+      S11 = S11 + half * (dot(x.x2, x.x2) - 1.0), S22 = S22 + half * (dot(x.x1, x.x1) - 1.0);
+      dS11 = dS11 + law.coupling * dot(x.x2, dx.x2), dS22 = dS22 + law.coupling * dot(x.x1, dx.x1);
+    }
     const Real dS12 = law.shear * (dot(x.x1, dx.x2) + dot(x.x2, dx.x1));
     if (kind == TangentKind::upper) {
       // Positive part of the symmetric 2 x 2 stress: (f(a) - f(b)) / (a - b) and its companion with f = max(., 0).
@@ -200,10 +214,17 @@ inline PointEnergy<Real> energy_hessian(const PointLaw& law, TangentKind kind, c
       dg_ab = dm * n.a3 + m * da3;
     };
     if (law.weft_warp_bending) {
-      const BendingTerms<Real> weft = evaluate<Real>(law.bending, dot(n.a3, x.x11) - rest.k11);
-      const BendingTerms<Real> warp = evaluate<Real>(law.bending, dot(n.a3, x.x22) - rest.k22);
-      add(weft.moment, weft.slope * (dot(n.a3, dx.x11) + dot(da3, x.x11)), x.x11, dx.x11, dg.x11);
-      add(warp.moment, warp.slope * (dot(n.a3, dx.x22) + dot(da3, x.x22)), x.x22, dx.x22, dg.x22);
+      const Real k11 = dot(n.a3, x.x11) - rest.k11, k22 = dot(n.a3, x.x22) - rest.k22;
+      const Real dk11 = dot(n.a3, dx.x11) + dot(da3, x.x11), dk22 = dot(n.a3, dx.x22) + dot(da3, x.x22);
+      const BendingTerms<Real> weft = evaluate<Real>(law.bending, k11), warp = evaluate<Real>(law.bending, k22);
+      const double across = law.bending_coupling;
+      if (across != 0) {
+        add(weft.moment + across * k22, weft.slope * dk11 + across * dk22, x.x11, dx.x11, dg.x11);
+        add(warp.moment + across * k11, warp.slope * dk22 + across * dk11, x.x22, dx.x22, dg.x22);
+      } else {
+        add(weft.moment, weft.slope * dk11, x.x11, dx.x11, dg.x11);
+        add(warp.moment, warp.slope * dk22, x.x22, dx.x22, dg.x22);
+      }
     }
     if (law.twists()) {
       const Real m12 = 2.0 * law.twist * (dot(n.a3, x.x12) - rest.k12);
@@ -241,16 +262,25 @@ inline void positive_hessian(const PointLaw& law, const PointJet<Real>& x, const
   const Real dj = dot(n.a3, dn);
   const Vec3<Real> da3 = n.inverse_j * (dn - dj * n.a3);
   Vec3<Real> dM{};
-  const auto add = [&](Real slope, const Vec3<Real>& x_ab, const Vec3<Real>& dx_ab, Vec3<Real>& dg_ab) {
-    const Real dm = slope * (dot(n.a3, dx_ab) + dot(da3, x_ab));
+  const auto add = [&](Real dm, const Vec3<Real>& x_ab, Vec3<Real>& dg_ab) {
     dM = dM + dm * x_ab;
     dg_ab = dm * n.a3;
   };
+  const auto change = [&](const Vec3<Real>& x_ab, const Vec3<Real>& dx_ab) {
+    return dot(n.a3, dx_ab) + dot(da3, x_ab);
+  };
   if (law.weft_warp_bending) {
-    add(evaluate<Real>(law.bending, dot(n.a3, x.x11) - rest.k11).slope, x.x11, dx.x11, dg.x11);
-    add(evaluate<Real>(law.bending, dot(n.a3, x.x22) - rest.k22).slope, x.x22, dx.x22, dg.x22);
+    const Real dk11 = change(x.x11, dx.x11), dk22 = change(x.x22, dx.x22);
+    Real weft = evaluate<Real>(law.bending, dot(n.a3, x.x11) - rest.k11).slope * dk11;
+    Real warp = evaluate<Real>(law.bending, dot(n.a3, x.x22) - rest.k22).slope * dk22;
+    if (law.bending_coupling != 0) {
+      weft = weft + law.bending_coupling * dk22;
+      warp = warp + law.bending_coupling * dk11;
+    }
+    add(weft, x.x11, dg.x11);
+    add(warp, x.x22, dg.x22);
   }
-  if (law.twists()) add(broadcast<Real>(2.0 * law.twist), x.x12, dx.x12, dg.x12);
+  if (law.twists()) add(2.0 * law.twist * change(x.x12, dx.x12), x.x12, dg.x12);
   const Vec3<Real> dt = n.inverse_j * (dM - dot(dM, n.a3) * n.a3) + (guard(law, n).curvature * dj) * n.a3;
   dg.x1 = dg.x1 + cross(x.x2, dt);
   dg.x2 = dg.x2 + cross(dt, x.x1);

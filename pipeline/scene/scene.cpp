@@ -150,6 +150,7 @@ Fabric read_fabric(Table table) {
     membrane->number(fabric.membrane.weft, "weft", dimension::force_per_length, Range::nonnegative);
     membrane->number(fabric.membrane.warp, "warp", dimension::force_per_length, Range::nonnegative);
     membrane->number(fabric.membrane.shear, "shear", dimension::force_per_length, Range::nonnegative);
+    membrane->number(fabric.membrane.coupling, "coupling", dimension::force_per_length, Range::any);
     membrane->done();
   }
   if (auto bending = table.table("bending", "bending")) {
@@ -158,6 +159,7 @@ Fabric read_fabric(Table table) {
     bending->number(law.kappa0, "kappa0", dimension::curvature, Range::positive);
     law.kappa_reg = bending->number("kappa_reg", dimension::curvature, Range::positive).value_or(law.kappa0 / 1000);
     bending->number(law.twist, "twist", dimension::moment, Range::nonnegative);
+    bending->number(law.coupling, "coupling", dimension::moment, Range::any);
     if (law.kappa_reg > law.kappa0) {
       const toml::node* node = bending->raw().get("kappa_reg");
       throw InputError(fmt::format("{}: kappa_reg in bending is {} 1/m, must not exceed kappa0 = {} 1/m",

@@ -49,10 +49,12 @@ std::span<const KeyWords> scene_words() {
       {"membrane.weft", "Stiffness along the weft"},
       {"membrane.warp", "Stiffness along the warp"},
       {"membrane.shear", "Stiffness in shear"},
+      {"membrane.coupling", "Of weft's stress on warp's strain and the other way (default: 0)"},
       {"bending.b0", "Bending stiffness beyond kappa0"},
       {"bending.kappa0", "Curvature up to which the cloth is stiffer"},
       {"bending.kappa_reg", "Curvature below which the law is smoothed (default: kappa0 / 1000)"},
       {"bending.twist", "Stiffness against twist (default: 0)"},
+      {"bending.coupling", "Of weft's moment on warp's curvature and the other way (default: 0)"},
 
       {"strain_limit.mode", "One tolerance for all strain, a band for each direction and sign, or none (inextensible)"},
       {"strain_limit.tolerance", "The limit; in a band what counts as met (default: 0.01; 1 % of the narrowest limit)"},

@@ -113,6 +113,11 @@ std::vector<ShellModel> models() {
                                    test::make_panel(test::bumpy_surface(degree, 2, 3, rational), fabric(0))});
   out.emplace_back(std::vector{test::make_panel(test::bumpy_surface(2, 4, 3, false), fabric(0, true, false))});
   out.emplace_back(std::vector{test::make_panel(test::bumpy_surface(4, 2, 3, false), fabric(0, false, true))});
+  Fabric coupled = fabric(1e-3);
+  coupled.membrane.coupling = 7;
+  coupled.bending.coupling = 0.03;
+  out.emplace_back(std::vector{test::make_panel(test::bumpy_surface(3, 3, 2, false), coupled, 0.3)});
+  out.emplace_back(std::vector{test::make_panel(test::bumpy_surface(2, 3, 3, false), isotropic(300, 0.3, 0.01))});
   ClothPanel cut = test::make_panel(test::bumpy_surface(2, 5, 4, false), fabric(1e-3));
   cut.quadrature = test::tensor_quadrature(cut.rest, {Interval{-0.7, 1.63}, Interval{0.03, 0.41}});
   out.emplace_back(std::vector{cut});

@@ -240,6 +240,26 @@ TEST(ShellModel, CurvatureTurnsWithTheGrainAsATensor) {
   }
 }
 
+// The classical shell has no grain, only while stretch, shear, bending, twist and both couplings belong together.
+TEST(ShellModel, AnIsotropicFabricDoesNotKnowItsGrain) {
+  Fabric fabric = isotropic(300, 0.3, 0.02);
+  const NurbsSurface surface = test::bumpy_surface(3, 3, 2, false);
+  const auto energies = [&](double grain) {
+    const ShellModel model({test::make_panel(surface, fabric, grain)});
+    const Eigen::VectorXd q = model.rest() + 0.02 * test::Random(5).vector(model.rest().size());
+    Eigen::VectorXd force(q.size());
+    const auto elastic = model.internal_force(q, force);
+    return std::array{elastic.membrane, elastic.bending, force.norm()};
+  };
+  const auto straight = energies(0);
+  EXPECT_GT(straight[0], 0);
+  EXPECT_GT(straight[1], 0);
+  for (const double grain : {0.3, 1.0})
+    for (int k = 0; k < 3; ++k) expect_near_rel(energies(grain)[k], straight[k], 1e-9);
+  fabric.bending.coupling = 0;
+  EXPECT_GT(std::abs(energies(0.3)[1] / energies(0)[1] - 1), 1e-3);
+}
+
 TEST(ShellModel, CurvedPanelKeepsItsRestCurvatureUnlessTold) {
   Fabric fabric = stiff_fabric();
   const ShellModel own({test::make_panel(test::cylinder_surface(0.25, 2.0, 0.6, 4, 2), fabric)});
