@@ -2,6 +2,7 @@
 // Toile as a library: read a panel, look at its trim, hang it from pins, write it back draped and trimmed.
 #include "toile/pipeline/run/drape_panel.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -21,8 +22,10 @@ int main(int argc, char** argv) try {
 
   const std::vector<std::string> pins(argv + 3, argv + argc);
   const toile::TrimmedSurface draped = toile::drape(panel, pins, {.span = 0.06});
-  const Eigen::Matrix3Xd& net = draped.surface.points();
-  std::printf("hangs down to z = %.3f m\n", file.metres_per_unit * net.row(2).minCoeff());
+  double lowest = 0;  // of the material: control points without cloth may lie anywhere
+  for (const Eigen::Vector2d& uv : toile::quadrature(draped).points)
+    lowest = std::min(lowest, draped.surface(uv.x(), uv.y()).z());
+  std::printf("hangs down to z = %.3f m\n", file.metres_per_unit * lowest);
 
   const toile::OutputFace face{draped, panel.name + " draped", 0, std::nullopt};
   toile::write_file(argv[2], toile::format_iges(std::span(&face, 1), {.unit = file.unit}).text);

@@ -170,8 +170,8 @@ TEST(StressRecovery, WhatPinsTakeUpDoesNotCount) {
   const ScalarRow pinned = l.model.place(0, 0.55, 0.62);
   rows.place.push_back({pinned, 0, [&](double) { return apply(pinned, q); }});
   // A strain row that acts on what is held only, and one whose force the pin takes up.
-  rows.strain.push_back({{{0, 1}, {-1, 1}}, 0, 0, false, 1, 1, 0, {0.05, 0}, {1, 0}});
-  rows.strain.push_back({pinned, 0, 0, true, 1, 1, 0, {0.55, 0.62}, {0, 1}});
+  rows.strain.push_back({{{0, 1}, {-1, 1}}, 0, 0, false, 1, 1, {0.05, 0}, {1, 0}});
+  rows.strain.push_back({pinned, 0, 0, true, 1, 1, {0.55, 0.62}, {0, 1}});
   const StressField::Options by_forces{.rows = 0};
   const StressField still(l.model, map, rows, Eigen::Matrix3Xd::Zero(3, 2), q, by_forces);
   Eigen::Matrix3Xd forces(3, 2);  // across the rows' own directions, so that they are no stress of the limit
