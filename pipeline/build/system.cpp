@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <numeric>
 
@@ -17,15 +16,13 @@
 #include "analysis/projection/primal_dual.h"
 #include "analysis/projection/substeps.h"
 #include "geometry/error.h"
+#include "pipeline/build/independent_rows.h"
 #include "pipeline/build/pin_reach.h"
 #include "pipeline/build/places.h"
 
 namespace toile {
 namespace {
 
-// Part of a row's inertia that rows before it must leave free for the row to be taken: less would hold little that
-// others don't, and solve badly. What the scene asks for by name is held down to what can be solved at all.
-constexpr double smallest_place_pivot = 1e-3, smallest_curve_pivot = 0.2;
 // Starting threads takes some microseconds: with fewer points a step by one is as fast.
 constexpr int least_points_for_threads = 2000;
 constexpr double rest_residual = 1e-7;  // of the loads
@@ -39,61 +36,6 @@ std::vector<int> on_both_sides(const std::vector<int>& control_points, const std
     if (held[static_cast<std::size_t>(leader[k])]) result.push_back(static_cast<int>(k));
   }
   return result;
-}
-
-struct Candidate {
-  ScalarRow row;
-  int pin = 0;
-  bool required = false;  // more than one of several along a curve
-};
-
-// Which candidates are independent of those before them and of the fixed control points: sparse Cholesky of the rows'
-// inertia N M^-1 N^T scaled to unit diagonal, in the order given; those that must be held come first.
-std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
-                              const Eigen::VectorXd& mass) {
-  const int n = static_cast<int>(candidates.size());
-  if (n == 0 || mass.size() == 0) return std::vector<bool>(candidates.size(), false);  // no place, or nothing left free
-  Eigen::SparseMatrix<double, Eigen::RowMajor> rows(n, map.control_points());
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int k = 0; k < n; ++k) {
-    const ScalarRow& row = candidates[static_cast<std::size_t>(k)].row;
-    for (std::size_t a = 0; a < row.index.size(); ++a) entries.emplace_back(k, row.index[a], row.value[a]);
-  }
-  rows.setFromTriplets(entries.begin(), entries.end());
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> reduced = rows * map.free_part();
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> weighted = reduced * mass.cwiseInverse().cwiseSqrt().asDiagonal();
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> products =
-      weighted * Eigen::SparseMatrix<double>(weighted.transpose());
-  // Row k of the Gram matrix by column; a place meets few others, and so does the fill of the factorisation.
-  std::vector<std::map<int, double>> gram(candidates.size());
-  Eigen::VectorXd left(n);
-  // A row that touches fixed control points only holds nothing new.
-  for (int k = 0; k < n; ++k) left[k] = std::sqrt(products.coeff(k, k)) > 1e-9 / std::sqrt(mass.maxCoeff()) ? 1 : 0;
-  for (int k = 0; k < n; ++k) {
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(products, k); it; ++it) {
-      const int l = static_cast<int>(it.col());
-      if (l == k || left[k] == 0 || left[l] == 0) continue;
-      gram[static_cast<std::size_t>(k)][l] = it.value() / std::sqrt(products.coeff(k, k) * products.coeff(l, l));
-    }
-  }
-  std::vector<bool> taken(candidates.size(), false);
-  for (const bool required : {true, false}) {
-    const double least = required ? smallest_place_pivot : smallest_curve_pivot;
-    for (int next = 0; next < n; ++next) {
-      if (candidates[static_cast<std::size_t>(next)].required != required || left[next] < least) continue;
-      taken[static_cast<std::size_t>(next)] = true;
-      const std::map<int, double> pivot = std::move(gram[static_cast<std::size_t>(next)]);
-      for (const auto& [k, at_k] : pivot) {
-        auto& row = gram[static_cast<std::size_t>(k)];
-        row.erase(next);
-        left[k] -= at_k * at_k / left[next];
-        for (const auto& [l, at_l] : pivot) {
-          if (l != k) row[l] -= at_k * at_l / left[next];
-        }
-      }
-    }
-  }
-  return taken;
 }
 
 // A point that others hold already adds nothing, so it is left out: a warning, unless one of them moves.

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which place rows hold something that the rows before them don't.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "analysis/map/affine_map.h"
+#include "analysis/model/body.h"
+
+namespace toile {
+
+struct Candidate {
+  ScalarRow row;
+  int pin = 0;
+  bool required = false;  // more than one of several along a curve
+};
+
+// Which candidates are independent of the fixed control points and of those taken before them, in the order given but
+// for the required ones, which come first: the pivots of a Cholesky factorisation of the rows' inertia N M^-1 N^T,
+// scaled to unit diagonal, that leaves out rows of too small a pivot. The factor has the taken rows only, so that time
+// and memory grow with their number, and by candidate only with what it shares with them. `mass` is by node [kg].
+std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
+                              const Eigen::VectorXd& mass);
+
+}  // namespace toile
