@@ -36,7 +36,8 @@ BoundaryBezier span_piece(const Curve2& curve, int span, double a, double b, con
         const int i = span - p + j;
         const Real left = knots[i], right = knots[i + p - r + 1];
         const Real alpha = (argument - left) / (right - left);
-        for (int c = 0; c < 3; ++c) d[j][c] = d[j - 1][c] + alpha * (d[j][c] - d[j - 1][c]);
+        // exact at alpha 0 and 1, however much smaller one of the two is
+        for (int c = 0; c < 3; ++c) d[j][c] = (1 - alpha) * d[j - 1][c] + alpha * d[j][c];
       }
     }
     piece.x[k] = d[p][0];
@@ -48,6 +49,42 @@ BoundaryBezier span_piece(const Curve2& curve, int span, double a, double b, con
 
 void reverse(BoundaryBezier& piece) {
   for (auto* values : {&piece.x, &piece.y, &piece.w}) std::reverse(values->begin(), values->begin() + piece.degree + 1);
+}
+
+// Weights that differ leave most of a piece to a sliver of its parameters, which quadrature passes over: w_k c^k are
+// weights of the same piece, with c such that both ends are equal [Piegl & Tiller 1997, 6.5], and each half of that has
+// weights closer to each other. Halves until they differ by less than `widest`.
+void append_even(BoundaryBezier piece, std::vector<BoundaryBezier>& out) {
+  constexpr Real widest = 4;
+  const int d = piece.degree;
+  const auto uneven = [&] {
+    const auto [low, high] = std::minmax_element(piece.w.begin(), piece.w.begin() + d + 1);
+    return *high >= widest * *low;
+  };
+  if (!piece.rational || !uneven()) {
+    out.push_back(piece);
+    return;
+  }
+  const Real c = std::pow(piece.w[0] / piece.w[d], Real(1) / d);
+  Real factor = 1;
+  for (int k = 1; k <= d; ++k) {
+    factor *= c;
+    for (auto* values : {&piece.x, &piece.y, &piece.w}) (*values)[k] *= factor;
+  }
+  if (!uneven()) {
+    out.push_back(piece);
+    return;
+  }
+  BoundaryBezier first = piece;
+  for (const auto values : {&BoundaryBezier::x, &BoundaryBezier::y, &BoundaryBezier::w}) {
+    auto& rest = piece.*values;
+    for (int r = 1; r <= d; ++r) {
+      for (int j = 0; j <= d - r; ++j) rest[j] = (rest[j] + rest[j + 1]) / 2;
+      (first.*values)[r] = rest[0];
+    }
+  }
+  append_even(first, out);
+  append_even(piece, out);
 }
 
 BoundaryBezier straight_piece(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Eigen::Vector2d& origin) {
@@ -151,7 +188,7 @@ void append_pieces(const TrimmedSurface& surface, const BoundaryPiece& piece, co
   int span = knots.find_span(low);
   for (double a = low; a < high;) {
     const double b = span >= last_span ? high : std::min(knots[span + 1], high);
-    out.push_back(span_piece(curve, span, a, b, origin));
+    append_even(span_piece(curve, span, a, b, origin), out);
     a = b;
     while (span < last_span && knots[span + 1] <= a) ++span;
   }

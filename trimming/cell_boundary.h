@@ -29,7 +29,8 @@ struct CellBoundary {
   std::vector<BoundaryBezier> pieces;  // chain after chain, closed: each starts bitwise where its predecessor ends
   std::vector<int> chain_ends;         // index of the first piece after each chain
 };
-// Appends the pieces of one part of the boundary, in its direction, coordinates from `origin`.
+// Appends the pieces of one part of the boundary, in its direction, coordinates from `origin`. Weights of a piece
+// differ by less than a factor of 4.
 void append_pieces(const TrimmedSurface& surface, const BoundaryPiece& piece, const Eigen::Vector2d& origin,
                    std::vector<BoundaryBezier>& out);
 void build_boundary(const TrimmedSurface& surface, const KnotMesh& mesh, const CutCell& cell, CellBoundary& out);

@@ -265,6 +265,38 @@ TEST(CutQuadrature, PartsOfSplinesAgreeWithTheirWhole) {
     for (int a = 0; a <= 4; ++a) expect_near_rel(moment(whole, a, b), moment(parts, a, b), 1e-12);
 }
 
+// A quarter of a circle with weights 1, s, s^2 is the same curve for any s, at other parameters.
+TEST(CutQuadrature, WeightsOfOneCurveMayDifferByAnyFactor) {
+  const double h = std::sqrt(0.5);
+  for (const double s : {1e-10, 1e-5, 1e5, 1e10}) {
+    SCOPED_TRACE(s);
+    const Side arc = trim(bezier({{1, 0}, {1, 1}, {0, 1}}, {1, h * s, s * s}));
+    const CutQuadrature rule = rule_of(cut_cell(2, {{border({0, 0}, {1, 0}), arc, border({0, 1}, {0, 0})}}));
+    for (int b = 0; b <= 4; ++b)
+      for (int a = 0; a <= 4; ++a)
+        expect_near_rel(moment(rule, a, b), std::beta((a + 1) / 2.0, (b + 1) / 2.0) / (a + b + 2) / 2, 1e-12);
+  }
+}
+
+// Under the conic (1, 0), (1, 1), (0, 1) of weights 1, h, 1: with x and y from (1, 1) the corner above it is x + y + 2
+// h sqrt(x y) < 1, whose area is -I'(h) / 4 with I = integral of 1 / (1 + h sin f) over half a turn.
+TEST(CutQuadrature, ConicsOfAnyWeightHaveTheirArea) {
+  for (const double h : {2.0, 100.0, 1e6, 1e10, 1e14}) {
+    SCOPED_TRACE(h);
+    const Side arc = trim(bezier({{1, 0}, {1, 1}, {0, 1}}, {1, h, 1}));
+    const CutQuadrature rule = rule_of(cut_cell(2, {{border({0, 0}, {1, 0}), arc, border({0, 1}, {0, 0})}}));
+    const double corner = (h * std::acosh(h) / std::sqrt(h * h - 1) - 1) / (h * h - 1) / 2;
+    expect_near_rel(rule.area, 1 - corner, 1e-12);
+  }
+  for (const double h : {1e-6, 1e-14}) {
+    SCOPED_TRACE(h);
+    const Side arc = trim(bezier({{1, 0}, {1, 1}, {0, 1}}, {1, h, 1}));
+    const CutQuadrature rule = rule_of(cut_cell(2, {{border({0, 0}, {1, 0}), arc, border({0, 1}, {0, 0})}}));
+    const double corner = (1 - h * std::acos(h) / std::sqrt(1 - h * h)) / (1 - h * h) / 2;
+    expect_near_rel(rule.area, 1 - corner, 1e-12);
+  }
+}
+
 TEST(CutQuadrature, UncutCellsCarryGaussPoints) {
   TrimmedSurface surface;
   surface.surface = flat_cell({0, 2}, {0, 3}, 2);
