@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <set>
@@ -64,6 +65,7 @@ class DxfReader {
 
  private:
   void choose_unit(const dxf::Drawing& drawing);
+  void name_what_is_left_out(const dxf::Drawing& drawing);
   std::vector<Piece> in_one_size(std::vector<Piece> pieces, const std::string& sample);
   std::vector<std::size_t> of_size(const std::vector<Piece>& pieces, const std::vector<std::size_t>& same,
                                    const std::string& sample);
@@ -104,6 +106,27 @@ void DxfReader::choose_unit(const dxf::Drawing& drawing) {
   out_.unit = unit.name;
   out_.metres_per_unit = unit.metres;
   out_.resolution = unit.name == "MM" ? 1e-3 : unit.name == "INCH" ? 1e-4 : 1e-6 / unit.metres;
+}
+
+void DxfReader::name_what_is_left_out(const dxf::Drawing& drawing) {
+  std::set<std::string> blocks;
+  for (std::size_t k = 1; k < drawing.blocks.size(); ++k) blocks.insert(drawing.blocks[k].name);
+  std::map<std::string, int> missing;  // by block, inserts of it
+  for (const dxf::Block& block : drawing.blocks)
+    for (const Item& item : block.items)
+      if (item.insert && !blocks.contains(item.insert->block)) ++missing[item.insert->block];
+  for (const dxf::Block& block : drawing.blocks) {
+    for (const Item& item : block.items) {
+      const auto named = item.insert ? missing.extract(item.insert->block) : decltype(missing)::node_type();
+      if (named)
+        warn(item.line, item.type + ": there is no block '" + named.key() + "'; it is left out" +
+                            (named.mapped() > 1 ? ", " + std::to_string(named.mapped()) + " times" : ""));
+      for (const dxf::Polyline& line : item.lines)
+        for (const double bulge : line.bulges)
+          if (!(std::abs(bulge) < dxf::largest_bulge))
+            warn(item.line, item.type + ": a bulge of " + toile::text(bulge) + " is no arc; it is drawn straight");
+    }
+  }
 }
 
 // Of pieces of one name, those of the size that is read.
@@ -434,6 +457,7 @@ void DxfReader::read(std::string_view text) {
   const dxf::Drawing drawing = dxf::read_drawing(text, name_);
   choose_unit(drawing);
   for (const std::string& warning : drawing.warnings) out_.warnings.push_back(warning);
+  name_what_is_left_out(drawing);
   std::vector<Piece> pieces = dxf::pieces_of(drawing);
   const bool layered = std::ranges::any_of(
       pieces, [](const Piece& piece) { return piece.on_layer("1") || piece.on_layer("84") || piece.on_layer("11"); });

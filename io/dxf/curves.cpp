@@ -73,7 +73,7 @@ std::vector<Curve3> curves_of(const Polyline& drawn, const Corners& corners) {
   };
   for (std::size_t k = start; k < start + segments; ++k) {
     const double bulge = line.bulges[k % n];
-    if (bulge != 0 && std::abs(bulge) < 1e6) {
+    if (bulge != 0 && std::abs(bulge) < largest_bulge) {
       flush();
       out.push_back(lifted(circular_arc_between(point(k), point(k + 1), 4 * std::atan(bulge)), line.height));
       run = {point(k + 1)};

@@ -16,6 +16,10 @@ struct Corners {
   double near = 0;                           // a turn point this near to a vertex is one
 };
 
+// Tangents of a quarter of an arc's angle that are beyond this, or no number, are drawn straight: such an arc is a full
+// circle but for rounding, and as large as its bulge.
+inline constexpr double largest_bulge = 1e6;
+
 // Arcs where a polyline bulges, polylines between corners. A closed polyline starts at its first corner, so that no
 // curve is cut where the file happens to begin.
 std::vector<Curve3> curves_of(const Item& item, const Corners& corners);

@@ -325,6 +325,31 @@ TEST(Dxf, LayersThatRepeatOthersAreReadInTheirStead) {
   EXPECT_EQ(count(alone.panels[0], MarkKind::line), 1);
 }
 
+TEST(Dxf, WhatIsLeftOutIsNamedByLineAndEntity) {
+  const std::string sound = poly("1", rectangle, true);
+  const std::string twice = insert("B") + insert("B");
+  const PanelFile missing = one_piece(sound, metric + twice);
+  expect_near_rel(area(missing.panels.at(0)), 300 * 400, 1e-12);
+  ASSERT_EQ(missing.warnings.size(), 1u);
+  const std::string text = file(block("A", words("Piece Name: A") + sound), insert("A") + metric + twice);
+  const auto line_of = [](const std::string& all, const std::string& word) {
+    return std::to_string(std::ranges::count(all.substr(0, all.find(word)), '\n') + 1);
+  };
+  // The line of the first insert's "0" is that before the entity's name.
+  const std::string first = std::to_string(std::stoi(line_of(text, "INSERT\n  8\n1\n  2\nB")) - 1);
+  EXPECT_EQ(missing.warnings[0], "p.dxf:" + first + ": INSERT: there is no block 'B'; it is left out, 2 times");
+
+  std::string bulging = sound;
+  const std::string vertex = xy(300, 0);
+  bulging.insert(bulging.find(vertex) + vertex.size(), " 42\n1e9\n");
+  const PanelFile straight = one_piece(bulging);
+  expect_near_rel(area(straight.panels.at(0)), 300 * 400, 1e-12);
+  ASSERT_EQ(straight.warnings.size(), 1u);
+  EXPECT_NE(straight.warnings[0].find(": POLYLINE: a bulge of 1e+09 is no arc; it is drawn straight"),
+            std::string::npos)
+      << straight.warnings[0];
+}
+
 TEST(Dxf, APieceIsUnfoldedAtEachMirrorLine) {
   // A quarter of a disc of radius 300, its arc a bulge of tan(90 / 4 degrees).
   std::string quarter = poly("1", {{0, 0}, {300, 0}, {0, 300}}, true);
