@@ -94,6 +94,14 @@ InspectedPanel inspect(TrimmedSurface face, const InspectOptions& options) {
       (notes ? panel.notes : panel.warnings).push_back(fmt::format("{}: {}", who, line));
   }
   panel.measure = measure(panel.face, panel.topology);
+  // A strip as wide as places that count as one, and as long as half of its border, would have this area.
+  const double least =
+      same_place(panel.face.resolution, panel.face.surface) * panel.face.metres_per_unit * perimeter(panel) / 2;
+  if (!(area(panel) > least))
+    panel.warnings.push_back(fmt::format(
+        "{}: it has no area, {:.3g} m2 within a border of {:.3g} m: its surface is a line or a point, or the "
+        "cloth is narrower than the file's resolution; draft it anew",
+        who, area(panel), perimeter(panel)));
   panel.active_control_points = active_control_points(panel.face.surface, panel.topology);
   merge_near_points(panel.face.surface, panel.points);
   return panel;

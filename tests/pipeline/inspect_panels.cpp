@@ -169,6 +169,27 @@ TEST(Inspect, ThreadsAndTheirNumberDontShow) {
   }
 }
 
+TEST(Inspect, ASurfaceWithoutAreaIsNamed) {
+  for (const double unit : {1.0, 1e-3}) {
+    PanelFile file = flat_panel(false, unit);
+    EXPECT_TRUE(inspect(file).warnings.empty());
+    const NurbsSurface& flat = file.panels.front().surface;
+    const Eigen::Vector3d along(1, 2, -0.5);
+    for (const Eigen::Matrix3d& squeeze :
+         {Eigen::Matrix3d(along * along.transpose()), Eigen::Matrix3d(Eigen::Vector3d(1, 1e-11, 1).asDiagonal())}) {
+      PanelFile line = file;
+      line.panels.front().surface = flat.with_points(squeeze * flat.points());
+      const Inspection found = inspect(line);
+      ASSERT_FALSE(found.warnings.empty());
+      EXPECT_NE(found.warnings.back().find("panel 'front': it has no area"), std::string::npos)
+          << found.warnings.back();
+    }
+    PanelFile narrow = file;  // a thread, but cloth
+    narrow.panels.front().surface = flat.with_points(Eigen::Vector3d(1, 1e-6, 1).asDiagonal() * flat.points());
+    EXPECT_TRUE(inspect(narrow).warnings.empty());
+  }
+}
+
 TEST(Inspect, NamesInAnyEncodingBecomeJson) {
   PanelFile file = flat_panel(false);
   file.exporter = "caf\xe9";                 // Latin-1
