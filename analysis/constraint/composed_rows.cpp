@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <string>
+
+#include "geometry/error.h"
 
 namespace toile {
 namespace {
@@ -73,6 +76,24 @@ CompressedRows transposed_by_mass(const CompressedRows& rows, const Eigen::Vecto
       out.column[slot] = r;
       out.value[slot] = rows.value[e] / node_mass[rows.column[e]];
     }
+  return out;
+}
+
+Eigen::VectorXd gram_diagonal(const AffineMap& map, const ConstraintRows& rows, const ComposedRows& composed,
+                              const Eigen::VectorXd& node_mass) {
+  if (node_mass.size() != map.nodes()) throw SolverError("constraints: one mass per free node expected");
+  for (int k = 0; k < node_mass.size(); ++k)
+    if (!(node_mass[k] > 0))
+      throw SolverError("constraints: control point " + std::to_string(map.node_control_point()[k]) + " has no mass");
+  const CompressedRows& d = composed.free;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(d.size());
+  for (int r = 0; r < d.size(); ++r)
+    for (int e = d.start[r]; e < d.start[r + 1]; ++e) out[r] += d.value[e] / node_mass[d.column[e]] * d.value[e];
+  const auto strains = static_cast<Eigen::Index>(rows.strain.size());
+  for (std::size_t p = 0; p < rows.place.size(); ++p)
+    if (!(out[strains + static_cast<Eigen::Index>(p)] > 0))
+      throw SolverError("pin " + std::to_string(rows.place[p].pin) +
+                        " holds a point whose control points are all fixed by other pins: remove one of them");
   return out;
 }
 

@@ -35,6 +35,11 @@ inline void evaluate(const ComposedRows& rows, const Eigen::Ref<const Eigen::Vec
 // Per node the rows that reach it, ascending, each divided by the node's mass: M^-1 D^T.
 CompressedRows transposed_by_mass(const CompressedRows& rows, const Eigen::VectorXd& node_mass);
 
+// Diagonal of D M^-1 D^T, per scalar row; 0: the row touches only fixed control points. Throws SolverError where a node
+// has no mass or a place row has a 0.
+Eigen::VectorXd gram_diagonal(const AffineMap& map, const ConstraintRows& rows, const ComposedRows& composed,
+                              const Eigen::VectorXd& node_mass);
+
 // Lower triangle of D M^-1 D^T over scalar rows, which never changes: the scalar part of J M^-1 J^T.
 struct GramMatrix {
   SparsePattern pattern;

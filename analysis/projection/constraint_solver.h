@@ -45,13 +45,22 @@ void fields(auto& archive, Like<ConstraintForces> auto& f) {
   archive(f.strain, f.place, f.stiffening, f.beyond);
 }
 
-// What the last step left behind, for reactions: rows and shapes as below.
+// What the last step left behind, for reactions.
 struct ProjectionMemory {
+  // Per row [kg m2 for strain rows, kg m for place rows]: divided by dt^2 they are the constraint forces' quadrature
+  // weights [N m, N].
   Eigen::VectorXd strain_multipliers;
-  Eigen::Matrix3Xd place_multipliers, strain_impulses;
+  Eigen::Matrix3Xd place_multipliers;
+  // Multiplier times direction, summed over the iterations [kg m]: control point I was pushed by -d_I times its column.
+  Eigen::Matrix3Xd strain_impulses;
 };
 void fields(auto& archive, Like<ProjectionMemory> auto& m) {
   archive(m.strain_multipliers, m.place_multipliers, m.strain_impulses);
+}
+inline ProjectionMemory no_impulses(const ConstraintRows& rows) {
+  const auto strains = static_cast<Eigen::Index>(rows.strain.size()),
+             places = static_cast<Eigen::Index>(rows.place.size());
+  return {Eigen::VectorXd::Zero(strains), Eigen::Matrix3Xd::Zero(3, places), Eigen::Matrix3Xd::Zero(3, strains)};
 }
 
 //   (1) fixed control points don't move;
@@ -82,15 +91,9 @@ class ConstraintSolver {
   // Energy [J] that the constraints store at x; 0 where they are hard.
   virtual double energy(const Eigen::Ref<const Eigen::VectorXd>&, double) { return 0; }
 
-  // Multipliers of the last step, per row [kg m2 for strain rows, kg m for place rows]: divided by dt^2 they are the
-  // constraint forces' quadrature weights [N m, N].
-  virtual const Eigen::VectorXd& strain_multipliers() const = 0;
-  virtual const Eigen::Matrix3Xd& place_multipliers() const = 0;
-  // Multiplier times direction, summed over the iterations [kg m]: control point I was pushed by -d_I times its column.
-  virtual const Eigen::Matrix3Xd& strain_impulses() const = 0;
-  // All three, and putting them back where a run is taken up again; false where their sizes are of other rows.
-  virtual ProjectionMemory memory() const = 0;
-  virtual bool restore(const ProjectionMemory& memory) = 0;
+  virtual const ProjectionMemory& memory() const = 0;
+  // Puts it back where a run is taken up again; false where its sizes are of other rows.
+  bool restore(const ProjectionMemory& memory);
 
   // Steps by these threads from now on: the same bits. Null: the caller's alone.
   virtual void use_threads(Workers* workers) = 0;
@@ -98,6 +101,19 @@ class ConstraintSolver {
   virtual const ConstraintRows& rows() const = 0;
   virtual std::size_t factor_nonzeros() const = 0;
   virtual std::size_t gram_nonzeros() const { return 0; }  // of the whole J M^-1 J^T; 0 where it isn't formed
+
+ private:
+  virtual void set_memory(const ProjectionMemory& memory) = 0;
 };
+
+inline bool ConstraintSolver::restore(const ProjectionMemory& from) {
+  const ProjectionMemory& to = memory();
+  if (from.strain_multipliers.size() != to.strain_multipliers.size() ||
+      from.strain_impulses.cols() != to.strain_impulses.cols() ||
+      from.place_multipliers.cols() != to.place_multipliers.cols())
+    return false;
+  set_memory(from);
+  return true;
+}
 
 }  // namespace toile

@@ -39,9 +39,9 @@ struct FastProjection::Impl {
   ConstraintRows rows;
   ProjectionOptions options;
   ComposedRows composed;
-  CompressedRows at_node;             // M^-1 D^T
-  std::vector<double> gram_diagonal;  // per scalar row; 0: takes no part
-  std::vector<int> system_scalar;     // scalar row of each system row
+  CompressedRows at_node;          // M^-1 D^T
+  Eigen::VectorXd gram_diagonal;   // per scalar row; 0: takes no part
+  std::vector<int> system_scalar;  // scalar row of each system row
   SparsePattern pattern;
   std::vector<double> gram, values;  // per entry of the pattern
   std::unique_ptr<Cholesky> factor;
@@ -49,13 +49,12 @@ struct FastProjection::Impl {
 
   Eigen::Matrix3Xd y, direction, targets, fixed_places;  // direction: scaled, per system row
   Eigen::VectorXd scale, residual, rhs, solution;
-  Eigen::VectorXd strain_lambda;
-  Eigen::Matrix3Xd place_lambda, strain_impulse;
+  ProjectionMemory memory;
   Eigen::Matrix3Xd impulse;  // per scalar row, of one push
   std::vector<Violation> worst_of_piece;
 
   Impl(const AffineMap& m, ConstraintRows r, const ProjectionOptions& o)
-      : map(m), rows(std::move(r)), options(o), composed(compose(map, rows)) {}
+      : map(m), rows(std::move(r)), options(o), composed(compose(map, rows)), memory(no_impulses(rows)) {}
 
   int strains() const { return static_cast<int>(rows.strain.size()); }
   int places() const { return static_cast<int>(rows.place.size()); }
@@ -79,21 +78,11 @@ struct FastProjection::Impl {
 };
 
 void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
-  if (node_mass.size() != map.nodes()) throw SolverError("projection: one mass per free node expected");
-  for (int k = 0; k < node_mass.size(); ++k)
-    if (!(node_mass[k] > 0))
-      throw SolverError("projection: control point " + std::to_string(map.node_control_point()[k]) + " has no mass");
-
+  gram_diagonal = toile::gram_diagonal(map, rows, composed, node_mass);
   at_node = transposed_by_mass(composed.free, node_mass);
 
   const GramMatrix scalar = gram_matrix(composed.free, node_mass);
   const int scalars = strains() + places();
-  gram_diagonal.resize(scalars);
-  for (int r = 0; r < scalars; ++r) gram_diagonal[r] = scalar.value[scalar.pattern.column_start[r]];
-  for (int p = 0; p < places(); ++p)
-    if (!(gram_diagonal[strains() + p] > 0))
-      throw SolverError("pin " + std::to_string(rows.place[p].pin) +
-                        " holds a point whose control points are all fixed by other pins: remove one of them");
 
   for (int r = 0; r < strains(); ++r) system_scalar.push_back(r);
   for (int p = 0; p < 3 * places(); ++p) system_scalar.push_back(strains() + p / 3);
@@ -125,9 +114,6 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
   residual.resize(size());
   rhs.resize(size());
   solution.resize(size());
-  strain_lambda = Eigen::VectorXd::Zero(strains());
-  place_lambda = Eigen::Matrix3Xd::Zero(3, places());
-  strain_impulse = Eigen::Matrix3Xd::Zero(3, strains());
   impulse.resize(3, scalars);
   worst_of_piece.resize(static_cast<std::size_t>(pieces(strains())));
 }
@@ -135,9 +121,9 @@ void FastProjection::Impl::build(const Eigen::VectorXd& node_mass) {
 void FastProjection::Impl::begin(double t) {
   map.fixed_places(t, fixed_places);
   for (int p = 0; p < places(); ++p) targets.col(p) = rows.place[p].target(t);
-  strain_lambda.setZero();
-  place_lambda.setZero();
-  strain_impulse.setZero();
+  memory.strain_multipliers.setZero();
+  memory.place_multipliers.setZero();
+  memory.strain_impulses.setZero();
 }
 
 // Violation and residual of strain rows, at y.
@@ -219,14 +205,14 @@ void FastProjection::Impl::push(const Eigen::VectorXd& amounts, Eigen::Ref<Eigen
   share_out(strains(), [&](int begin, int end) {
     for (int r = begin; r < end; ++r) {
       impulse.col(r) = amounts[r] * direction.col(r);
-      strain_lambda[r] += scale[r] * amounts[r];
-      strain_impulse.col(r) += impulse.col(r);
+      memory.strain_multipliers[r] += scale[r] * amounts[r];
+      memory.strain_impulses.col(r) += impulse.col(r);
     }
   });
   for (int i = strains(); i < size(); ++i) {
     const int p = (i - strains()) / 3, k = (i - strains()) % 3;
     impulse(k, strains() + p) = amounts[i] * scale[i];
-    place_lambda(k, p) += impulse(k, strains() + p);
+    memory.place_multipliers(k, p) += impulse(k, strains() + p);
   }
   // Node by node, so that a thread writes what no other does.
   share_out(map.nodes(), [&](int begin, int end) {
@@ -308,27 +294,11 @@ ProjectionReport FastProjection::measure(const Eigen::Ref<const Eigen::VectorXd>
   return report;
 }
 
-const Eigen::VectorXd& FastProjection::strain_multipliers() const {
-  return impl_->strain_lambda;
+const ProjectionMemory& FastProjection::memory() const {
+  return impl_->memory;
 }
-const Eigen::Matrix3Xd& FastProjection::place_multipliers() const {
-  return impl_->place_lambda;
-}
-const Eigen::Matrix3Xd& FastProjection::strain_impulses() const {
-  return impl_->strain_impulse;
-}
-ProjectionMemory FastProjection::memory() const {
-  return {impl_->strain_lambda, impl_->place_lambda, impl_->strain_impulse};
-}
-bool FastProjection::restore(const ProjectionMemory& memory) {
-  Impl& s = *impl_;
-  if (memory.strain_multipliers.size() != s.strains() || memory.strain_impulses.cols() != s.strains() ||
-      memory.place_multipliers.cols() != s.places())
-    return false;
-  s.strain_lambda = memory.strain_multipliers;
-  s.place_lambda = memory.place_multipliers;
-  s.strain_impulse = memory.strain_impulses;
-  return true;
+void FastProjection::set_memory(const ProjectionMemory& memory) {
+  impl_->memory = memory;
 }
 const ConstraintRows& FastProjection::rows() const {
   return impl_->rows;

@@ -45,11 +45,7 @@ class FastProjection final : public ConstraintSolver {
                         const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) override;
 
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
-  const Eigen::VectorXd& strain_multipliers() const override;
-  const Eigen::Matrix3Xd& place_multipliers() const override;
-  const Eigen::Matrix3Xd& strain_impulses() const override;
-  ProjectionMemory memory() const override;
-  bool restore(const ProjectionMemory& memory) override;
+  const ProjectionMemory& memory() const override;
   void use_threads(Workers* workers) override;
   const ConstraintRows& rows() const override;
   const ProjectionOptions& options() const;
@@ -57,6 +53,7 @@ class FastProjection final : public ConstraintSolver {
   std::size_t gram_nonzeros() const override;
 
  private:
+  void set_memory(const ProjectionMemory& memory) override;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -47,7 +47,7 @@ struct LagrangeNewton::Impl {
         options(o),
         composed(compose(map, rows)),
         mass(node_mass),
-        gram_diagonal(Eigen::VectorXd::Zero(composed.free.size())),
+        gram_diagonal(toile::gram_diagonal(map, rows, composed, mass)),
         matrix(composed.free, mass),
         y(3, size()),
         targets(3, places()),
@@ -60,20 +60,7 @@ struct LagrangeNewton::Impl {
         force(3 * map.nodes()),
         rhs(3 * map.nodes()),
         solution(3 * map.nodes()),
-        memory{Eigen::VectorXd::Zero(strains()), Eigen::Matrix3Xd::Zero(3, places()),
-               Eigen::Matrix3Xd::Zero(3, strains())} {
-    if (mass.size() != map.nodes()) throw SolverError("constraints: one mass per free node expected");
-    for (int k = 0; k < mass.size(); ++k)
-      if (!(mass[k] > 0))
-        throw SolverError("constraints: control point " + std::to_string(map.node_control_point()[k]) + " has no mass");
-    const CompressedRows& d = composed.free;
-    for (int k = 0; k < size(); ++k)
-      for (int e = d.start[k]; e < d.start[k + 1]; ++e) gram_diagonal[k] += d.value[e] * d.value[e] / mass[d.column[e]];
-    for (int p = 0; p < places(); ++p)
-      if (!(gram_diagonal[strains() + p] > 0))
-        throw SolverError("pin " + std::to_string(rows.place[p].pin) +
-                          " holds a point whose control points are all fixed by other pins: remove one of them");
-  }
+        memory(no_impulses(rows)) {}
 
   Eigen::VectorXd& lambda() { return memory.strain_multipliers; }
   int strains() const { return static_cast<int>(rows.strain.size()); }
@@ -260,26 +247,11 @@ ProjectionReport LagrangeNewton::measure(const Eigen::Ref<const Eigen::VectorXd>
   return report;
 }
 
-const Eigen::VectorXd& LagrangeNewton::strain_multipliers() const {
-  return impl_->memory.strain_multipliers;
-}
-const Eigen::Matrix3Xd& LagrangeNewton::place_multipliers() const {
-  return impl_->memory.place_multipliers;
-}
-const Eigen::Matrix3Xd& LagrangeNewton::strain_impulses() const {
-  return impl_->memory.strain_impulses;
-}
-ProjectionMemory LagrangeNewton::memory() const {
+const ProjectionMemory& LagrangeNewton::memory() const {
   return impl_->memory;
 }
-bool LagrangeNewton::restore(const ProjectionMemory& memory) {
-  ProjectionMemory& now = impl_->memory;
-  const auto fits = [](const auto& a, const auto& b) { return a.rows() == b.rows() && a.cols() == b.cols(); };
-  if (!fits(memory.strain_multipliers, now.strain_multipliers) || !fits(memory.strain_impulses, now.strain_impulses) ||
-      !fits(memory.place_multipliers, now.place_multipliers))
-    return false;
-  now = memory;
-  return true;
+void LagrangeNewton::set_memory(const ProjectionMemory& memory) {
+  impl_->memory = memory;
 }
 void LagrangeNewton::use_threads(Workers* workers) {
   impl_->matrix.use_threads(workers);

@@ -69,7 +69,7 @@ struct PrimalDual::Impl {
         options(o),
         composed(compose(map, rows)),
         mass(node_mass),
-        gram_diagonal(Eigen::VectorXd::Zero(composed.free.size())),
+        gram_diagonal(toile::gram_diagonal(map, rows, composed, mass)),
         matrix(composed.free, mass, added),
         y(3, size()),
         targets(3, places()),
@@ -84,22 +84,9 @@ struct PrimalDual::Impl {
         lambda(Eigen::VectorXd::Zero(strains())),
         mu(Eigen::Matrix3Xd::Zero(3, places())),
         row_force(3, size()),
-        memory{Eigen::VectorXd::Zero(strains()), Eigen::Matrix3Xd::Zero(3, places()),
-               Eigen::Matrix3Xd::Zero(3, strains())} {
-    if (mass.size() != map.nodes()) throw SolverError("strain limit: one mass per free node expected");
-    for (int k = 0; k < mass.size(); ++k)
-      if (!(mass[k] > 0))
-        throw SolverError("strain limit: control point " + std::to_string(map.node_control_point()[k]) +
-                          " has no mass");
+        memory(no_impulses(rows)) {
     for (const StrainRow& row : rows.strain)
       if (!(row.stiffness > 0)) throw SolverError("strain limit: a row has no stiffness");
-    const CompressedRows& d = composed.free;
-    for (int k = 0; k < size(); ++k)
-      for (int e = d.start[k]; e < d.start[k + 1]; ++e) gram_diagonal[k] += d.value[e] * d.value[e] / mass[d.column[e]];
-    for (int p = 0; p < places(); ++p)
-      if (!(gram_diagonal[strains() + p] > 0))
-        throw SolverError("pin " + std::to_string(rows.place[p].pin) +
-                          " holds a point whose control points are all fixed by other pins: remove one of them");
     for (Eigen::VectorXd* v : {&guess, &force, &rhs, &solution, &trial, &held, &part}) v->resize(3 * map.nodes());
   }
 
@@ -544,26 +531,11 @@ double PrimalDual::energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) 
   impl_->measure(x, report);
   return impl_->limit_energy();
 }
-const Eigen::VectorXd& PrimalDual::strain_multipliers() const {
-  return impl_->memory.strain_multipliers;
-}
-const Eigen::Matrix3Xd& PrimalDual::place_multipliers() const {
-  return impl_->memory.place_multipliers;
-}
-const Eigen::Matrix3Xd& PrimalDual::strain_impulses() const {
-  return impl_->memory.strain_impulses;
-}
-ProjectionMemory PrimalDual::memory() const {
+const ProjectionMemory& PrimalDual::memory() const {
   return impl_->memory;
 }
-bool PrimalDual::restore(const ProjectionMemory& memory) {
-  ProjectionMemory& now = impl_->memory;
-  const auto fits = [](const auto& a, const auto& b) { return a.rows() == b.rows() && a.cols() == b.cols(); };
-  if (!fits(memory.strain_multipliers, now.strain_multipliers) || !fits(memory.strain_impulses, now.strain_impulses) ||
-      !fits(memory.place_multipliers, now.place_multipliers))
-    return false;
-  now = memory;
-  return true;
+void PrimalDual::set_memory(const ProjectionMemory& memory) {
+  impl_->memory = memory;
 }
 void PrimalDual::use_threads(Workers* workers) {
   impl_->matrix.use_threads(workers);

@@ -70,16 +70,13 @@ class PrimalDual final : public ConstraintSolver {
   void settle(Eigen::Ref<Eigen::VectorXd> v, double t) override;
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
   double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
-  const Eigen::VectorXd& strain_multipliers() const override;
-  const Eigen::Matrix3Xd& place_multipliers() const override;
-  const Eigen::Matrix3Xd& strain_impulses() const override;
-  ProjectionMemory memory() const override;
-  bool restore(const ProjectionMemory& memory) override;
+  const ProjectionMemory& memory() const override;
   void use_threads(Workers* workers) override;
   const ConstraintRows& rows() const override;
   std::size_t factor_nonzeros() const override;
 
  private:
+  void set_memory(const ProjectionMemory& memory) override;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

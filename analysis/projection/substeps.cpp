@@ -53,7 +53,7 @@ struct Substeps::Impl {
   Eigen::VectorXd strain, stiffness, stiff_row, skews, stiffening;
   Eigen::VectorXd places_of_y;
   double time_of_y = 0;
-  // Forces at the start and the end of the last step: of what strain_impulses() shows when asked.
+  // Forces at the start and the end of the last step: of what memory() shows when asked.
   struct Ends {
     double dt = 0;
     Eigen::Matrix3Xd y_start, y_end;
@@ -125,8 +125,7 @@ Substeps::Impl::Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, Const
       stiffness(Eigen::VectorXd::Zero(strains())),
       stiff_row(strains()),
       skews(strains()),
-      memory{Eigen::VectorXd::Zero(strains()), Eigen::Matrix3Xd::Zero(3, places()),
-             Eigen::Matrix3Xd::Zero(3, strains())} {
+      memory(no_impulses(rows)) {
   check_rows();
   make_kernels();
   make_place_factor();
@@ -134,11 +133,7 @@ Substeps::Impl::Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, Const
 }
 
 void Substeps::Impl::check_rows() {
-  if (mass.size() != map.nodes()) throw SolverError("strain limit: one mass per free node expected");
-  for (int k = 0; k < mass.size(); ++k)
-    if (!(mass[k] > 0))
-      throw SolverError("strain limit: control point " +
-                        std::to_string(map.node_control_point()[static_cast<std::size_t>(k)]) + " has no mass");
+  const Eigen::VectorXd gram = gram_diagonal(map, rows, composed, mass);
   const CompressedRows &d = composed.free, &g = composed.fixed;
   CompressedRows of_strain;
   double total = 0;
@@ -146,11 +141,11 @@ void Substeps::Impl::check_rows() {
     const StrainRow& row = rows.strain[static_cast<std::size_t>(r)];
     if (!(row.stiffness > 0)) throw SolverError("strain limit: a row has no stiffness");
     for (int e = d.start[r]; e < d.start[r + 1]; ++e) reach[r] += std::abs(d.value[e]);
-    if (g.start[r] < g.start[r + 1] && reach[r] > 0) held.push_back(r);
+    if (g.start[r] < g.start[r + 1] && gram[r] > 0) held.push_back(r);
     warp.push_back(row.warp);
     const StrainBand& b = band(r);
     slack.push_back({-b.slack * b.compress, b.slack * b.stretch});
-    weight[r] = reach[r] > 0 ? row.area : 0;
+    weight[r] = gram[r] > 0 ? row.area : 0;
     total += weight[r];
     if (r > 0) {
       const StrainRow& last = rows.strain[static_cast<std::size_t>(r - 1)];
@@ -230,9 +225,6 @@ void Substeps::Impl::make_place_factor() {
   if (places() == 0) return;
   const CompressedRows& d = composed.free;
   for (int r = strains(); r < d.size(); ++r) {
-    if (d.start[r] == d.start[r + 1])
-      throw SolverError("pin " + std::to_string(rows.place[static_cast<std::size_t>(r - strains())].pin) +
-                        " holds a point whose control points are all fixed by other pins: remove one of them");
     for (int e = d.start[r]; e < d.start[r + 1]; ++e) {
       place_rows.column.push_back(d.column[e]);
       place_rows.value.push_back(d.value[e]);
@@ -517,30 +509,13 @@ double Substeps::energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) {
   measure(x, t);
   return impl_->energy();
 }
-const Eigen::VectorXd& Substeps::strain_multipliers() const {
-  impl_->show_impulses();
-  return impl_->memory.strain_multipliers;
-}
-const Eigen::Matrix3Xd& Substeps::place_multipliers() const {
-  return impl_->memory.place_multipliers;
-}
-const Eigen::Matrix3Xd& Substeps::strain_impulses() const {
-  impl_->show_impulses();
-  return impl_->memory.strain_impulses;
-}
-ProjectionMemory Substeps::memory() const {
+const ProjectionMemory& Substeps::memory() const {
   impl_->show_impulses();
   return impl_->memory;
 }
-bool Substeps::restore(const ProjectionMemory& memory) {
-  ProjectionMemory& now = impl_->memory;
-  const auto fits = [](const auto& a, const auto& b) { return a.rows() == b.rows() && a.cols() == b.cols(); };
-  if (!fits(memory.strain_multipliers, now.strain_multipliers) || !fits(memory.strain_impulses, now.strain_impulses) ||
-      !fits(memory.place_multipliers, now.place_multipliers))
-    return false;
-  now = memory;
+void Substeps::set_memory(const ProjectionMemory& memory) {
+  impl_->memory = memory;
   impl_->ends.shown = true;
-  return true;
 }
 void Substeps::use_threads(Workers* workers) {
   if (impl_->projection) impl_->projection->use_threads(workers);

@@ -60,18 +60,15 @@ class Substeps final : public ConstraintSolver {
   double step_share() const override { return 0.5; }
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
   double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
-  const Eigen::VectorXd& strain_multipliers() const override;
-  const Eigen::Matrix3Xd& place_multipliers() const override;
-  // Of rows at fixed control points the mean over the step, of others that of its start and end.
-  const Eigen::Matrix3Xd& strain_impulses() const override;
-  ProjectionMemory memory() const override;
-  bool restore(const ProjectionMemory& memory) override;
+  // Impulses: of rows at fixed control points the mean over the step, of others that of its start and end.
+  const ProjectionMemory& memory() const override;
   void use_threads(Workers* workers) override;
   const ConstraintRows& rows() const override;
   std::size_t factor_nonzeros() const override;
   int nets() const;  // that are worked off by lines
 
  private:
+  void set_memory(const ProjectionMemory& memory) override;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

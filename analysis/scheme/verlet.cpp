@@ -47,16 +47,17 @@ void add_constraint_forces(const MechanicalSystem& system, double dt, Vector& f,
   }
   const ConstraintSolver& projection = *system.projection;
   const ConstraintRows& rows = projection.rows();
+  const ProjectionMemory& last = projection.memory();
   const double per_step = 1 / (dt * dt);
   for (std::size_t r = 0; r < rows.strain.size(); ++r) {
     const ScalarRow& row = rows.strain[r].row;
-    const Eigen::Vector3d impulse = projection.strain_impulses().col(r);
+    const Eigen::Vector3d impulse = last.strain_impulses.col(r);
     if (!impulse.isZero(0)) add(row, -per_step * impulse, f);
   }
   place.resize(3, static_cast<Eigen::Index>(rows.place.size()));
   for (std::size_t p = 0; p < rows.place.size(); ++p) {
     const ScalarRow& row = rows.place[p].row;
-    place.col(p) = -per_step * projection.place_multipliers().col(p);
+    place.col(p) = -per_step * last.place_multipliers.col(p);
     add(row, place.col(p), f);
   }
 }

@@ -119,9 +119,10 @@ double unseen_energy(const Build& build, const System& system, const Eigen::Vect
 
 Eigen::VectorXd row_forces(const System& system, const Eigen::VectorXd& q, double dt) {
   const std::vector<StrainRow>& rows = system.projection->rows().strain;
+  const Eigen::Matrix3Xd& impulses = system.projection->memory().strain_impulses;
   Eigen::VectorXd forces = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.size()));
   for (Eigen::Index r = 0; dt > 0 && r < forces.size(); ++r) {
-    const Eigen::Vector3d impulse = system.projection->strain_impulses().col(r);
+    const Eigen::Vector3d impulse = impulses.col(r);
     const Eigen::Vector3d tangent = apply(rows[static_cast<std::size_t>(r)].row, q);
     forces[r] = std::copysign(impulse.norm(), impulse.dot(tangent)) / (dt * dt);
   }
@@ -133,7 +134,7 @@ StressField stress_field(const Build& build, const System& system, const Eigen::
   // A pin along a curve stands for whatever line load its curve may carry.
   rows.place.insert(rows.place.end(), system.along_curves.begin(), system.along_curves.end());
   Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, system.strain_rows);
-  if (dt > 0) forces = system.projection->strain_impulses() / (dt * dt);
+  if (dt > 0) forces = system.projection->memory().strain_impulses / (dt * dt);
   return StressField(*build.model, *system.map, rows, forces, q);
 }
 

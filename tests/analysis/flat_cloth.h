@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -74,6 +75,18 @@ inline Eigen::VectorXd disturbed(const Eigen::VectorXd& q, double size, unsigned
   Eigen::VectorXd out = q;
   for (double& value : out) value += draw(rng);
   return out;
+}
+
+// Linear, then angular about the origin, per node with its mass.
+inline Eigen::Matrix<double, 6, 1> momenta(const Eigen::VectorXd& mass, const Eigen::VectorXd& x,
+                                           const Eigen::VectorXd& v) {
+  Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
+  for (int k = 0; k < mass.size(); ++k) {
+    const Eigen::Vector3d p = mass[k] * v.segment<3>(3 * k), at = x.segment<3>(3 * k);
+    sum.head<3>() += p;
+    sum.tail<3>() += at.cross(p);
+  }
+  return sum;
 }
 
 inline double strain(const ScalarRow& row, const Eigen::VectorXd& q) {

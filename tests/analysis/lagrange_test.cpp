@@ -110,8 +110,10 @@ TEST(LagrangeNewton, ForcesPointAlongTheGradientsAtTheEnd) {
   EXPECT_LT(linear.norm(), 1e-13 * size);
   EXPECT_LT(angular.norm(), 1e-9 * size);
   for (std::size_t r = 0; r < rows.strain.size(); ++r)
-    EXPECT_LT((solver.strain_impulses().col(r) - solver.strain_multipliers()[r] * apply(rows.strain[r].row, x)).norm(),
-              1e-15);
+    EXPECT_LT(
+        (solver.memory().strain_impulses.col(r) - solver.memory().strain_multipliers[r] * apply(rows.strain[r].row, x))
+            .norm(),
+        1e-15);
 }
 
 // However far from balance an iteration is: what it pushes sums to nothing.
@@ -158,7 +160,7 @@ TEST(LagrangeNewton, WhatBucklesInAStepIsProjected) {
   EXPECT_TRUE(report.damped);
   projection.project(projected, 0);
   EXPECT_EQ(x, projected);
-  EXPECT_EQ(solver.strain_impulses(), projection.strain_impulses());
+  EXPECT_EQ(solver.memory().strain_impulses, projection.memory().strain_impulses);
 }
 
 }  // namespace

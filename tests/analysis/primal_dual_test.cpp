@@ -19,6 +19,7 @@ using test::disturbed;
 using test::flat_cloth;
 using test::FlatCloth;
 using test::free_map;
+using test::momenta;
 using test::scalar_row;
 using test::strain;
 using test::vertex_rows;
@@ -164,18 +165,9 @@ TEST(PrimalDual, KeepsMomentumExactlyAndSpinNearly) {
     Motion motion{c.rest, disturbed(c.rest, 0.3, 4) - c.rest, {}};
     for (int k = 0; k < c.mass.size(); ++k)
       motion.v.segment<3>(3 * k) += Eigen::Vector3d(1, -2, 3).cross(Eigen::Vector3d(c.rest.segment<3>(3 * k)));
-    const auto momenta = [&] {
-      Eigen::Matrix<double, 6, 1> p = Eigen::Matrix<double, 6, 1>::Zero();
-      for (int k = 0; k < c.mass.size(); ++k) {
-        const Eigen::Vector3d v = c.mass[k] * motion.v.segment<3>(3 * k), x = motion.x.segment<3>(3 * k);
-        p.head<3>() += v;
-        p.tail<3>() += x.cross(v);
-      }
-      return p;
-    };
-    const auto before = momenta();
+    const auto before = momenta(c.mass, motion.x, motion.v);
     for (int k = 0; k < std::lround(0.032 / dt); ++k) EXPECT_TRUE(motion.step(solver, dt).converged);
-    const auto after = momenta();
+    const auto after = momenta(c.mass, motion.x, motion.v);
     EXPECT_LT((after - before).head<3>().norm(), 1e-8 * before.head<3>().norm());  // rounding over dt
     return (after - before).tail<3>().norm() / before.tail<3>().norm();
   };

@@ -138,11 +138,11 @@ TEST(FastProjection, MovesByTheMultipliersItReports) {
     Eigen::Vector3d y = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < row.index.size(); ++k) y += row.value[k] * before.segment<3>(3 * row.index[k]);
     for (std::size_t k = 0; k < row.index.size(); ++k)
-      impulse.segment<3>(3 * row.index[k]) -= projection.strain_multipliers()[r] * row.value[k] * y;
+      impulse.segment<3>(3 * row.index[k]) -= projection.memory().strain_multipliers[r] * row.value[k] * y;
   }
   const ScalarRow& pin = projection.rows().place[0].row;
   for (std::size_t k = 0; k < pin.index.size(); ++k)
-    impulse.segment<3>(3 * pin.index[k]) -= pin.value[k] * projection.place_multipliers().col(0);
+    impulse.segment<3>(3 * pin.index[k]) -= pin.value[k] * projection.memory().place_multipliers.col(0);
   for (int k = 0; k < c.mass.size(); ++k)
     for (int a = 0; a < 3; ++a) expect_near_rel(c.mass[k] * (x - before)[3 * k + a], impulse[3 * k + a], 1e-9, 1e-15);
 }
@@ -203,7 +203,7 @@ TYPED_TEST(AnySolver, RowsOnFixedControlPointsOnlyTakeNoPart) {
   Eigen::VectorXd x = map.restrict(c.rest);
   const ProjectionReport report = projection.project(x, 0);
   EXPECT_TRUE(x.allFinite());
-  for (int k = 0; k < 2 * 9; k += 2) EXPECT_EQ(projection.strain_multipliers()[k], 0);  // weft rows along v = 0
+  for (int k = 0; k < 2 * 9; k += 2) EXPECT_EQ(projection.memory().strain_multipliers[k], 0);  // weft rows along v = 0
   EXPECT_TRUE(report.worst_row < 0 || report.worst_row >= 2 * 9 || report.worst_row % 2 == 1);
 }
 

@@ -376,7 +376,7 @@ TEST(Verlet, FreeClothKeepsItsMomentumAndItsSpin) {
     const Eigen::VectorXd before = state.x;
     const StepReport report = step(scene.system, state, dt);
     EXPECT_TRUE(report.projection.converged && !report.projection.damped);
-    pushed = std::max(pushed, scene.projection->strain_multipliers().cwiseAbs().maxCoeff() / (dt * dt));
+    pushed = std::max(pushed, scene.projection->memory().strain_multipliers.cwiseAbs().maxCoeff() / (dt * dt));
     Motion motion{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
     for (int k = 0; k < mass.size(); ++k) {
       const Eigen::Vector3d v = (state.x - before).segment<3>(3 * k) / dt;
