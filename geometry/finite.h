@@ -19,5 +19,10 @@ inline void require_finite(const Eigen::Vector2d& x, const char* what) {
   if (!x.allFinite())
     throw GeometryError(std::string(what) + " is at (" + text(x.x()) + ", " + text(x.y()) + "), must be finite");
 }
+inline void require_finite(const Eigen::Vector3d& x, const char* what) {
+  if (!x.allFinite())
+    throw GeometryError(std::string(what) + " is at (" + text(x.x()) + ", " + text(x.y()) + ", " + text(x.z()) +
+                        "), must be finite");
+}
 
 }  // namespace toile
