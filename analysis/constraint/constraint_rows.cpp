@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "analysis/constraint/row_areas.h"
+#include "geometry/error.h"
 
 namespace toile {
 namespace {
@@ -30,6 +31,13 @@ ScalarRow make_row(const MaterialPoint& point, int which) {
 }
 
 }  // namespace
+
+void require_whole_places(const ConstraintRows& rows) {
+  for (const PlaceRow& row : rows.place)
+    if (row.axes != Eigen::Vector3d::Ones())
+      throw SolverError("pin " + std::to_string(row.pin) +
+                        " holds some components only (hold), which only the default solver of the strain limit does");
+}
 
 std::vector<StrainRow> strain_rows(const Body& body, const AffineMap& map,
                                    const std::vector<std::vector<ConstraintPoint>>& points) {

@@ -15,7 +15,7 @@ namespace toile {
 
 // Each has a row d over the body's points, which gives the vector y = sum_I d_I q_I.
 //   strain rows: d = N_,weft or N_,warp at a constraint point; C = (y.y - 1) / 2                 [eq. 36]
-//   place rows:  d = N at a pinned material point; C = y - target(t), three components, always an equality.
+//   place rows:  d = N at a pinned material point; C = y - target(t), three components or some, always an equality.
 struct StrainRow {
   ScalarRow row;
   int panel = 0;
@@ -30,12 +30,16 @@ struct PlaceRow {
   ScalarRow row;
   int pin = 0;                                    // of the scene, for reactions and messages
   std::function<Eigen::Vector3d(double)> target;  // place at time t [m]
+  Eigen::Vector3d axes{1, 1, 1};                  // 1: held, 0: free
 };
 
 struct ConstraintRows {
   std::vector<StrainRow> strain;
   std::vector<PlaceRow> place;
 };
+
+// For solvers that hold all components of a place row or none. Throws SolverError where one holds some.
+void require_whole_places(const ConstraintRows& rows);
 
 // Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points()
 // gives them. Functions that vanish at a point (all but p per direction on a C1 knot line) are left out. Rows are hard;

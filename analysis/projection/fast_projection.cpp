@@ -263,6 +263,7 @@ ProjectionReport FastProjection::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x) {
 FastProjection::FastProjection(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
                                const ProjectionOptions& options)
     : impl_(std::make_unique<Impl>(map, std::move(rows), options)) {
+  require_whole_places(impl_->rows);
   impl_->build(node_mass);
 }
 FastProjection::~FastProjection() = default;

@@ -193,7 +193,9 @@ void LagrangeNewton::Impl::project(Eigen::Ref<Eigen::VectorXd> x, double t, Proj
 
 LagrangeNewton::LagrangeNewton(const AffineMap& map, const Eigen::VectorXd& node_mass, ConstraintRows rows,
                                const ProjectionOptions& options)
-    : impl_(std::make_unique<Impl>(map, node_mass, std::move(rows), options)) {}
+    : impl_(std::make_unique<Impl>(map, node_mass, std::move(rows), options)) {
+  require_whole_places(impl_->rows);
+}
 LagrangeNewton::~LagrangeNewton() = default;
 
 ProjectionReport LagrangeNewton::project(Eigen::Ref<Eigen::VectorXd> x, double t) {

@@ -52,9 +52,10 @@ struct PrimalDual::Impl {
   Eigen::VectorXd held, part;
   Eigen::VectorXd friction, strain_before;  // per strain row: N m per strain, and the strain at the start
   Eigen::Matrix3Xd pins_later, pin_velocity, row_velocity;
-  Eigen::VectorXd lambda;      // N m
-  Eigen::Matrix3Xd mu;         // N
-  Eigen::Matrix3Xd row_force;  // per scalar row: lambda y, mu
+  Eigen::VectorXd place_compliance;  // m/N
+  Eigen::VectorXd lambda;            // N m
+  Eigen::Matrix3Xd mu;               // N
+  Eigen::Matrix3Xd row_force;        // per scalar row: lambda y, mu
   // |M^-1/2 force|: at work at the start of the step, of rounded places, what may be left of a step.
   double reference = 0, rounding = 0, allowed = 0;
   double tau = 0;
@@ -81,6 +82,7 @@ struct PrimalDual::Impl {
         friction(Eigen::VectorXd::Zero(strains())),
         strain_before(Eigen::VectorXd::Zero(strains())),
         row_velocity(3, size()),
+        place_compliance(places()),
         lambda(Eigen::VectorXd::Zero(strains())),
         mu(Eigen::Matrix3Xd::Zero(3, places())),
         row_force(3, size()),
@@ -102,7 +104,7 @@ struct PrimalDual::Impl {
     return std::min(b.stretch, b.compress);
   }
 
-  double place_compliance(int p) const { return place_softness * gram_diagonal[strains() + p] * tau * tau; }  // m/N
+  void soften_places(const Eigen::Ref<const Eigen::VectorXd>& x);
 
   void at(double t) {
     map.fixed_places(t, fixed_places);
@@ -153,9 +155,11 @@ void PrimalDual::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, Proje
     report.worst_row = r;
   }
   gap = y.rightCols(places()) - targets;
-  for (int p = 0; p < places(); ++p)
+  for (int p = 0; p < places(); ++p) {
+    gap.col(p) = gap.col(p).cwiseProduct(rows.place[p].axes);
     if (!(gap.col(p).norm() <= report.place_violation) && !std::isnan(report.place_violation))
       report.place_violation = gap.col(p).norm();
+  }
   report.converged = report.strain_violation <= options.tolerance && report.place_violation <= options.place_tolerance;
 }
 
@@ -202,6 +206,23 @@ double PrimalDual::Impl::excess(const Eigen::Ref<const Eigen::VectorXd>& x, Proj
   return report.converged ? left : std::max(left, unmet);
 }
 
+// A small part of what a row would give by inertia and the nodes' own stiffness.
+void PrimalDual::Impl::soften_places(const Eigen::Ref<const Eigen::VectorXd>& x) {
+  for (int p = 0; p < places(); ++p) place_compliance[p] = place_softness * gram_diagonal[strains() + p] * tau * tau;
+  if (!smooth || places() == 0) return;
+  const BlockMatrix& hessian = smooth->hessian(x, true);
+  const CompressedRows& d = composed.free;
+  for (int p = 0; p < places(); ++p) {
+    double give = 0;
+    for (int e = d.start[strains() + p]; e < d.start[strains() + p + 1]; ++e) {
+      const double* const own = hessian.block(hessian.pattern().first_slot(d.column[e]));
+      const double stiff = mass[d.column[e]] / (tau * tau) + std::max({own[0], own[4], own[8]});
+      give += d.value[e] * d.value[e] / stiff;
+    }
+    place_compliance[p] = place_softness * give;
+  }
+}
+
 // By `slope`, friction and the tensions.
 void PrimalDual::Impl::set_matrix() {
   matrix.scale = 1 / (tau * tau);
@@ -211,8 +232,8 @@ void PrimalDual::Impl::set_matrix() {
         stiff == 0 ? SymmetricBlock() : SymmetricBlock::along(stiff, y.col(r).data(), std::max(pull(r), 0.0));
   });
   for (int p = 0; p < places(); ++p) {
-    const double stiff = 1 / place_compliance(p);
-    matrix.blocks[strains() + p] = {stiff, stiff, stiff};
+    const Eigen::Vector3d stiff = rows.place[p].axes / place_compliance[p];
+    matrix.blocks[strains() + p] = {stiff.x(), stiff.y(), stiff.z()};
   }
   has_matrix = true;
 }
@@ -226,7 +247,7 @@ bool PrimalDual::Impl::factorise(const Eigen::Ref<const Eigen::VectorXd>& x) {
 // `anew`: not by the factor of the iteration before. False where the matrix is not positive.
 bool PrimalDual::Impl::solve(const Eigen::Ref<const Eigen::VectorXd>& x, bool anew, ProjectionReport& report) {
   each_row([&](int r) { row_force.col(r) = -slope[r] * missed[r] * y.col(r); });
-  for (int p = 0; p < places(); ++p) row_force.col(strains() + p) = -gap.col(p) / place_compliance(p);
+  for (int p = 0; p < places(); ++p) row_force.col(strains() + p) = -gap.col(p) / place_compliance[p];
   rhs = -force;
   matrix.spread(row_force, rhs);
   const Clock::time_point start = Clock::now();
@@ -285,7 +306,8 @@ bool PrimalDual::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& 
           after * lambda[r] >= 0 ? after : law(r).force(0.5 * ((y.col(r) + share * change.col(r)).squaredNorm() - 1));
     });
     for (int p = 0; p < places(); ++p)
-      mu.col(p) += share / place_compliance(p) * (gap.col(p) + change.col(strains() + p));
+      mu.col(p) +=
+          share / place_compliance[p] * (gap.col(p) + change.col(strains() + p).cwiseProduct(rows.place[p].axes));
   }
 }
 
@@ -297,7 +319,7 @@ double PrimalDual::Impl::merit(const Eigen::Ref<const Eigen::VectorXd>& x) {
   for (int k = 0; k < mass.size(); ++k)
     sum += 0.5 * mass[k] / (tau * tau) * (x - guess).segment<3>(3 * k).squaredNorm();
   for (int p = 0; p < places(); ++p)
-    sum += mu.col(p).dot(gap.col(p)) + 0.5 / place_compliance(p) * gap.col(p).squaredNorm();
+    sum += mu.col(p).dot(gap.col(p)) + 0.5 / place_compliance[p] * gap.col(p).squaredNorm();
   for (int r = 0; r < strains(); ++r) sum += 0.5 * friction[r] * std::pow(strain[r] - strain_before[r], 2);
   if (smooth) sum += smooth->value(x);
   return sum + limit_energy();
@@ -334,7 +356,7 @@ bool PrimalDual::Impl::search(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& r
       if (halvings == 30) return false;
     }
     x = trial;
-    for (int p = 0; p < places(); ++p) mu.col(p) += gap.col(p) / place_compliance(p);
+    for (int p = 0; p < places(); ++p) mu.col(p) += gap.col(p) / place_compliance[p];
     now = places() > 0 ? merit(x) : there;
   }
   return false;
@@ -352,6 +374,7 @@ ProjectionReport PrimalDual::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eige
   }
   s.tau = dt / 2;
   const double tau2 = s.tau * s.tau;
+  s.soften_places(start);
   s.at(t - dt);
   s.measure(start, report);
   s.take(forces);
@@ -431,6 +454,7 @@ ProjectionReport PrimalDual::minimise(Eigen::VectorXd& x, const Eigen::VectorXd&
   s.at(t);
   s.measure(x, report);
   s.take(forces);
+  s.soften_places(x);
   const Eigen::VectorXd was = x;
   bool solved = s.iterate(x, report);
   if (!solved) {
@@ -464,7 +488,7 @@ void PrimalDual::settle(Eigen::Ref<Eigen::VectorXd> v, double t) {
     // What rows and pins at work leave of it is resolved; the rest goes on.
     s.each_row([&](int r) { s.row_force.col(r) = -(s.matrix.blocks[r] * s.row_velocity.col(r)); });
     for (int p = 0; p < s.places(); ++p)
-      s.row_force.col(s.strains() + p) = s.row_velocity.col(s.strains() + p) / s.place_compliance(p);
+      s.row_force.col(s.strains() + p) = s.row_velocity.col(s.strains() + p) / s.place_compliance[p];
     for (int n = 0; n < s.mass.size(); ++n)
       s.rhs.segment<3>(3 * n) = s.matrix.scale * s.mass[n] * s.part.segment<3>(3 * n);
     s.matrix.spread(s.row_force, s.rhs);
@@ -487,10 +511,12 @@ void PrimalDual::Impl::move_pins(double t) {
   pin_velocity = (pins_later - pin_velocity) / (2 * pin_interval);
   solution.setZero();
   evaluate(composed, solution, pin_velocity, row_velocity);
-  for (int p = 0; p < places(); ++p)
+  for (int p = 0; p < places(); ++p) {
     row_velocity.col(strains() + p) =
         (rows.place[p].target(t + pin_interval) - rows.place[p].target(t - pin_interval)) / (2 * pin_interval) -
         row_velocity.col(strains() + p);
+    row_velocity.col(strains() + p) = row_velocity.col(strains() + p).cwiseProduct(rows.place[p].axes);
+  }
 }
 
 double PrimalDual::Impl::limit_energy() {

@@ -126,6 +126,7 @@ Substeps::Impl::Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, Const
       stiff_row(strains()),
       skews(strains()),
       memory(no_impulses(rows)) {
+  require_whole_places(rows);
   check_rows();
   make_kernels();
   make_place_factor();

@@ -25,7 +25,7 @@ void fields(auto& archive, Like<DynamicState> auto& s) {
   archive(s.t, s.x, s.v, s.a, s.constraint, s.q, s.f);
 }
 
-// Dead loads on control points [N], 3 n: gravity on the true mass and tractions; wind [m/s] acts through drag.
+// Dead loads on control points [N], 3 n: gravity on the true mass, tractions and forces; wind [m/s] acts through drag.
 struct Loads {
   Eigen::VectorXd force;
   Eigen::Vector3d wind = Eigen::Vector3d::Zero();

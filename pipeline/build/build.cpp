@@ -378,6 +378,25 @@ Build build(Scene scene) {
       }
     }
   }
+  for (std::size_t f = 0; f < result.scene.forces.size(); ++f) {
+    const SceneForce& load = result.scene.forces[f];
+    const int k = result.panel(load.panel);
+    const BuiltPanel& panel = result.panels[static_cast<std::size_t>(k)];
+    const NurbsSurface& rest = result.rest(k);
+    const auto end = [](const KnotVector& knots, int which) {
+      return which == 0 ? knots.domain().min : knots.domain().max;
+    };
+    const Eigen::Vector2d uv = load.at.kind == Address::Kind::uv
+                                   ? load.at.uv
+                                   : Eigen::Vector2d(end(rest.u(), load.at.a), end(rest.v(), load.at.b));
+    if (!in_material(panel.face, panel.topology, uv)) {
+      throw GeometryError(fmt::format("{}: force {} ({}) is not on the material of panel '{}'", load.where, f,
+                                      load.at.text, panel.name));
+    }
+    const ScalarRow row = result.model->place(k, uv.x(), uv.y());
+    for (std::size_t i = 0; i < row.index.size(); ++i)
+      loads.force.segment<3>(3 * row.index[i]) += row.value[i] * load.force;
+  }
   for (const SceneSeam& seam : result.scene.seams) {
     for (const SeamSide& side : {seam.a, seam.b}) {
       const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(side.panel))];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pipeline/build/independent_rows.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <queue>
@@ -76,7 +77,7 @@ class TakenRows {
 }  // namespace
 
 std::vector<bool> independent(const std::vector<Candidate>& candidates, const AffineMap& map,
-                              const Eigen::VectorXd& mass) {
+                              const Eigen::VectorXd& mass, int axis) {
   std::vector<bool> taken(candidates.size(), false);
   if (candidates.empty() || mass.size() == 0) return taken;  // no place, or nothing left free
   const Eigen::VectorXd weight = mass.cwiseInverse().cwiseSqrt();
@@ -87,7 +88,7 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
   Entries row;
   for (const bool required : {true, false}) {
     for (std::size_t k = 0; k < candidates.size() && !rows.full(); ++k) {
-      if (candidates[k].required != required) continue;
+      if (candidates[k].required != required || candidates[k].axes[axis] == 0) continue;
       const ScalarRow& places = candidates[k].row;
       row.clear();
       for (std::size_t a = 0; a < places.index.size(); ++a) {
@@ -109,6 +110,21 @@ std::vector<bool> independent(const std::vector<Candidate>& candidates, const Af
     }
   }
   return taken;
+}
+
+std::vector<Eigen::Vector3d> independent_axes(const std::vector<Candidate>& candidates, const AffineMap& map,
+                                              const Eigen::VectorXd& mass) {
+  const bool alike =
+      std::ranges::all_of(candidates, [](const Candidate& c) { return c.axes == c.axes[0] * Eigen::Vector3d::Ones(); });
+  std::vector<Eigen::Vector3d> out(candidates.size(), Eigen::Vector3d::Zero());
+  for (int axis = 0; axis < (alike ? 1 : 3); ++axis) {
+    const std::vector<bool> taken = independent(candidates, map, mass, axis);
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      if (taken[k] && alike) out[k].setOnes();
+      if (taken[k]) out[k][axis] = 1;
+    }
+  }
+  return out;
 }
 
 }  // namespace toile

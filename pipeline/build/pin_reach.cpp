@@ -62,7 +62,7 @@ void refuse_out_of_reach(const Build& build, double t, const MovedPoint& moved) 
   for (std::size_t a = 0; a < scene.pins.size(); ++a) {
     for (std::size_t b = 0; b < a; ++b) {
       const ScenePin &p = scene.pins[a], &q = scene.pins[b];
-      if (p.panel != q.panel || !(p.move || q.move)) continue;
+      if (p.panel != q.panel || !(p.move || q.move) || p.partial() || q.partial()) continue;
       const int panel = build.panel(p.panel);
       const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
       if (!shell.straight_u) continue;

@@ -282,15 +282,17 @@ void require_edge(const Edge& edge, const PanelPlaces& panel, const std::string&
                   who, edge.direction == 0 ? 'u' : 'v', edge.end, panel.name));
 }
 
-void add_edge(const Edge& edge, bool clamp, const NurbsSurface& surface, std::vector<int>& out) {
+void add_edge(const Edge& edge, bool clamp, const NurbsSurface& surface, HeldPlace& out) {
   const int n_u = surface.count_u(), n_v = surface.count_v();
   const int across = edge.direction == 0 ? n_u : n_v, along = edge.direction == 0 ? n_v : n_u;
-  for (int row = 0; row < (clamp ? 2 : 1); ++row) {
+  const auto at = [&](int row, int k) {
     const int fixed = edge.end == 0 ? row : across - 1 - row;
-    for (int k = 0; k < along; ++k) {
-      out.push_back(edge.direction == 0 ? surface.index(fixed, k) : surface.index(k, fixed));
-    }
+    return edge.direction == 0 ? surface.index(fixed, k) : surface.index(k, fixed);
+  };
+  for (int row = 0; row < (clamp ? 2 : 1); ++row) {
+    for (int k = 0; k < along; ++k) out.control_points.push_back(at(row, k));
   }
+  for (int k = 0; clamp && k < along; ++k) out.across.push_back({at(0, k), at(1, k)});
 }
 
 [[noreturn]] void no_clamp(const std::string& who) {
@@ -341,7 +343,7 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
     }
     case Address::Kind::edge: {
       require_edge(edge_of(at), panel, who);
-      add_edge(edge_of(at), clamp, surface, held.control_points);
+      add_edge(edge_of(at), clamp, surface, held);
       break;
     }
     case Address::Kind::curve: {
@@ -353,7 +355,7 @@ HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, co
       }
       const auto edge = whole_edge(curves, surface);
       if (edge && at.from == 0 && at.to == 1) {
-        add_edge(*edge, clamp, surface, held.control_points);
+        add_edge(*edge, clamp, surface, held);
         break;
       }
       if (clamp) no_clamp(who);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -47,8 +48,9 @@ struct LinePoint {
 // curve too, at some places more than at others. Curves of few spans have at least degree + 1 points, closed ones
 // 2 degree + 1.
 struct HeldPlace {
-  std::vector<int> control_points;      // of the panel's net, ascending
-  std::vector<Eigen::Vector2d> points;  // parameters
+  std::vector<int> control_points;         // of the panel's net, ascending
+  std::vector<std::array<int, 2>> across;  // of a clamped edge: each of its control points and the next one inwards
+  std::vector<Eigen::Vector2d> points;     // parameters
   // Of `points` so many must be held by rows; of the others as many as are independent enough. Of a curve: both ends
   // where it is open, three points where it closes.
   std::size_t required = 0;

@@ -39,15 +39,15 @@ std::vector<int> on_both_sides(const std::vector<int>& control_points, const std
 }
 
 // A point that others hold already adds nothing, so it is left out: a warning, unless one of them moves.
-std::string held_twice(const Scene& scene, const std::vector<Candidate>& candidates, const std::vector<bool>& taken,
-                       std::size_t k, const Eigen::VectorXd& start) {
+std::string held_twice(const Scene& scene, const std::vector<Candidate>& candidates,
+                       const std::vector<Eigen::Vector3d>& taken, std::size_t k, const Eigen::VectorXd& start) {
   const ScenePin& pin = scene.pins[static_cast<std::size_t>(candidates[k].pin)];
   const Eigen::Vector3d at = apply(candidates[k].row, start);
   const ScenePin* other = nullptr;  // of the nearest place
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t l = 0; l < candidates.size(); ++l) {
     const double distance = (apply(candidates[l].row, start) - at).norm();
-    if (!taken[l] || candidates[l].pin == candidates[k].pin || !(distance < nearest)) continue;
+    if (taken[l].isZero() || candidates[l].pin == candidates[k].pin || !(distance < nearest)) continue;
     nearest = distance;
     other = &scene.pins[static_cast<std::size_t>(candidates[l].pin)];
   }
@@ -57,6 +57,43 @@ std::string held_twice(const Scene& scene, const std::vector<Candidate>& candida
             : fmt::format("{}: {} is held by pins of control points already", pin.where, pin.at.text);
   if (pin.move || (other && other->move)) throw InputError(what + " and one of them moves");
   return what + "; the first one is left out";
+}
+
+// A clamped edge of which some components are held: the control points beside it are held in the same ones. Where that
+// is a single one, the edge lies in a plane of symmetry normal to it: the cloth goes on across it as it did at the
+// start.
+void hold_across(const std::vector<std::array<int, 2>>& across, const Eigen::Vector3d& hold, int first, int pin,
+                 std::vector<Candidate>& candidates) {
+  const bool symmetric = hold.sum() == 1;
+  for (const auto& [edge, next] : across) {
+    candidates.push_back({{{first + edge}, {1.0}}, pin, true, hold});
+    if (!symmetric) {
+      candidates.push_back({{{first + next}, {1.0}}, pin, true, hold});
+      continue;
+    }
+    const double side = edge < next ? 1 : -1;
+    candidates.push_back({{{first + std::min(edge, next), first + std::max(edge, next)}, {-side, side}},
+                          pin,
+                          true,
+                          Eigen::Vector3d::Ones() - hold,
+                          true});
+  }
+}
+
+// What holds pins by component is PrimalDual.
+void require_solver_of_components(const Scene& scene) {
+  const StrainLimit& limit = scene.strain_limit;
+  const char* const other = limit.solver == LimitSolver::lagrange               ? "strain_limit.solver = \"lagrange\""
+                            : limit.on && limit.solver == LimitSolver::substeps ? "strain_limit.solver = \"substeps\""
+                            : limit.on && limit.variant != ProjectionVariant::newton
+                                ? "strain_limit.variant = \"paper\""
+                                : nullptr;
+  for (std::size_t p = 0; other && p < scene.pins.size(); ++p) {
+    const ScenePin& pin = scene.pins[p];
+    if (!pin.partial()) continue;
+    throw InputError(fmt::format("{}: pin {} ({}): hold leaves components free, which {} can't; leave that key out",
+                                 pin.where, p, pin.at.text, other));
+  }
 }
 
 PrimalDualOptions limit_options(const StrainLimit& limit) {
@@ -107,6 +144,7 @@ StepReport step(const System& system, DynamicState& state, double dt, StepWork& 
 
 std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers) {
   const Scene& scene = build.scene;
+  require_solver_of_components(scene);
   auto system = std::make_unique<System>();
 
   // What each pin holds.
@@ -127,35 +165,49 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     const std::string who = fmt::format("{}: pin {} ({})", pin.where, p, pin.at.text);
     const PanelPlaces places{panel.name, panel.face, panel.topology, build.rest(k), start, panel.carries_cloth};
     const HeldPlace place = held_place(pin.at, pin.clamp, places, who);
+    const int first = build.model->first_point(k);
+    if (pin.partial() && pin.clamp && place.across.empty())
+      throw InputError(who + ": hold: clamp = true with some components held works at edges in this version");
     int points = 0;
     const auto count = [&](int i) {
       mean[p] += start.col(i);
       ++points;
     };
     std::vector<int> followers;
+    if (pin.partial() && pin.clamp) {
+      hold_across(place.across, pin.hold, first, static_cast<int>(p), candidates);
+      for (const auto& [edge, next] : place.across) count(edge);
+    }
     for (const int i : on_both_sides(place.control_points, panel.leader)) {
+      if (pin.partial() && pin.clamp) break;
       const bool leads = panel.leader[static_cast<std::size_t>(i)] == i;
+      if (pin.partial()) {
+        if (!leads) continue;
+        candidates.push_back({{{first + i}, {1.0}}, static_cast<int>(p), true, pin.hold});
+        count(i);
+        continue;
+      }
       if (panel.smooth_seams.follows(build.rest(k), i)) {
         if (leads) followers.push_back(i);
         continue;
       }
-      held.push_back({build.model->first_point(k) + i, static_cast<int>(p)});
+      held.push_back({first + i, static_cast<int>(p)});
       if (leads) count(i);  // a seam's place counts once
     }
     // Fixed by itself a point of a smooth seam would no longer follow its neighbours, and the seam could fold there.
     for (const int i : followers) {
-      candidates.push_back({{{build.model->first_point(k) + i}, {1.0}}, static_cast<int>(p), true});
+      candidates.push_back({{{first + i}, {1.0}}, static_cast<int>(p), true});
     }
     if (points == 0) std::ranges::for_each(followers, count);
     for (std::size_t i = 0; i < place.points.size(); ++i) {
       const Eigen::Vector2d& uv = place.points[i];
-      candidates.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), i < place.required});
+      candidates.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), i < place.required, pin.hold});
       mean[p] += apply(candidates.back().row, build.start);
       ++points;
     }
     mean[p] /= points;
     for (const Eigen::Vector2d& uv : place.curve)
-      along_curves.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), {}});
+      along_curves.push_back({build.model->place(k, uv.x(), uv.y()), static_cast<int>(p), {}, pin.hold});
   }
   std::ranges::stable_sort(held, {}, &Held::control_point);
   std::vector<Held> fixed;
@@ -207,15 +259,19 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   }
 
   ConstraintRows rows;
-  const std::vector<bool> taken = independent(candidates, *system->map, dynamic.node_mass);
+  const std::vector<Eigen::Vector3d> taken = independent_axes(candidates, *system->map, dynamic.node_mass);
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     Candidate& c = candidates[k];
     const Eigen::Vector3d from = apply(c.row, build.start);
     const bool point = scene.pins[static_cast<std::size_t>(c.pin)].at.kind == Address::Kind::uv;
-    if (!taken[k] && point) system->warnings.push_back(held_twice(scene, candidates, taken, k, build.start));
-    if (!taken[k]) continue;
+    if (taken[k] != c.axes && point) system->warnings.push_back(held_twice(scene, candidates, taken, k, build.start));
+    if (taken[k].isZero()) continue;
     const int pin = c.pin;
-    rows.place.push_back({c.row, pin, [moved, pin, from](double time) { return moved(pin, from, time); }});
+    rows.place.push_back({c.row, pin, {}, taken[k]});
+    if (c.difference)
+      rows.place.back().target = [from](double) { return from; };
+    else
+      rows.place.back().target = [moved, pin, from](double time) { return moved(pin, from, time); };
     system->place_pin.push_back(pin);
   }
   for (PlaceRow& place : along_curves) {
@@ -249,6 +305,11 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   }
   system->strain_rows = static_cast<int>(rows.strain.size());
   system->place_rows = static_cast<int>(rows.place.size());
+  bool partial = false;
+  for (const PlaceRow& row : rows.place) {
+    system->place_components += static_cast<int>(row.axes.sum());
+    partial = partial || row.axes != Eigen::Vector3d::Ones();
+  }
   if (!rows.strain.empty() || !rows.place.empty()) {
     ProjectionOptions options;
     options.tolerance = limit.tolerance;
@@ -263,7 +324,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
                                                                       .tolerance = limit.tolerance,
                                                                       .percentile = limit.percentile,
                                                                       .nets = nets_of(build)});
-    else if (limit.on && limit.variant == ProjectionVariant::newton)
+    else if (partial || (limit.on && limit.variant == ProjectionVariant::newton))
       system->projection =
           std::make_unique<PrimalDual>(*system->map, dynamic.node_mass, std::move(rows), limit_options(limit));
     else

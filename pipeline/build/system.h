@@ -22,8 +22,8 @@ struct System {
   // Per panel: which the projection takes, and why not. Those that the panel lists, and those of the sampling rule and
   // of pins besides; a StrainRow's `point` counts through the first, then the second.
   std::vector<std::vector<ConstraintPoint>> points, extra_points;
-  std::vector<std::string> warnings;  // pins that hold what others hold
-  int strain_rows = 0, place_rows = 0;
+  std::vector<std::string> warnings;                          // pins that hold what others hold
+  int strain_rows = 0, place_rows = 0, place_components = 0;  // components that place rows hold
   std::optional<Eigen::Vector2d> unbalanced;  // unbalanced_part() of the strain rows, where they are of points
   std::vector<int> place_pin;                 // pin of each place row
   std::vector<PlaceRow> along_curves;         // 200 places along each curve that a pin holds by some of its points

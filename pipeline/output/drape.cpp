@@ -324,7 +324,7 @@ int dry_run(Scene scene, bool json, Console& console) {
     out["control_points"] = built.model->point_count();
     out["degrees_of_freedom"] = 3 * system->map->nodes();
     out["strain_rows"] = system->strain_rows;
-    out["pin_rows"] = 3 * system->place_rows;
+    out["pin_rows"] = system->place_components;
     out["unused_points"] = reasons;
     out["warnings"] = built.warnings;
     fmt::print("{}\n", json_text(out));
@@ -343,7 +343,7 @@ int dry_run(Scene scene, bool json, Console& console) {
   }
   fmt::print("memory     about {:.2g} MB\n", bytes / 1e6);
   fmt::print("unknowns   {} of {} control points\n", 3 * system->map->nodes(), built.model->point_count());
-  fmt::print("rows       {} of strain, {} of pins\n", system->strain_rows, 3 * system->place_rows);
+  fmt::print("rows       {} of strain, {} of pins\n", system->strain_rows, system->place_components);
   for (const auto& [why, count] : reasons) fmt::print("unused     {} constraint points: {}\n", count, why);
   return exit_ok;
 }

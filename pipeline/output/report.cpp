@@ -123,7 +123,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["control_points"] = build.model->point_count();
   report["constraint_points"] = points;
   report["constraint_points_used"] = scene.strain_limit.on ? used : 0;
-  report["constraint_rows"] = {{"strain", system.strain_rows}, {"pins", 3 * system.place_rows}};
+  report["constraint_rows"] = {{"strain", system.strain_rows}, {"pins", system.place_components}};
   report["strain"] = {{"max_weft", m.strain.max[0]},
                       {"max_warp", m.strain.max[1]},
                       {"min_weft", m.strain.min[0]},

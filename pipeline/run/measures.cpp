@@ -271,7 +271,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   m.gaps.resize(build.scene.pins.size());
   for (const PlaceRow& place : system.along_curves) {
     std::optional<double>& gap = m.gaps[static_cast<std::size_t>(place.pin)];
-    gap = std::max(gap.value_or(0), (apply(place.row, q) - place.target(state.t)).norm());
+    gap = std::max(gap.value_or(0), (apply(place.row, q) - place.target(state.t)).cwiseProduct(place.axes).norm());
   }
   return m;
 }

@@ -172,7 +172,29 @@ Fabric read_fabric(Table table) {
   if (const auto curvature = table.choice("rest_curvature", {"panel", "zero"}, {})) {
     fabric.rest_curvature = *curvature == "zero" ? RestCurvature::zero : RestCurvature::panel;
   }
-  table.choice("law", {"weft-warp"}, {"isotropic", "orthotropic-3d"});
+  const bool isotropic_law = table.choice("law", {"weft-warp", "isotropic"}, {"orthotropic-3d"}) == "isotropic";
+  const auto youngs_modulus = table.number("youngs_modulus", dimension::pressure, Range::positive);
+  const auto poissons_ratio = table.number("poissons_ratio", dimension::none, Range::any);
+  for (const char* key : {"youngs_modulus", "poissons_ratio"}) {
+    const toml::node* node = table.raw().get(key);
+    if (!isotropic_law && node) table.fail(*node, fmt::format("{} belongs to law = \"isotropic\"", key));
+    if (isotropic_law && !node) table.missing(key, "law = \"isotropic\" asks for it");
+  }
+  if (isotropic_law) {
+    for (const char* key : {"membrane", "bending"}) {
+      if (const toml::node* node = table.raw().get(key))
+        table.fail(
+            *node,
+            fmt::format("{}: law = \"isotropic\" has its stiffness from youngs_modulus, poissons_ratio and thickness",
+                        key));
+    }
+    if (!(*poissons_ratio > -1 && *poissons_ratio <= 0.5))
+      table.fail(*table.raw().get("poissons_ratio"),
+                 fmt::format("poissons_ratio is {}, must be above -1 and at most 0.5", *poissons_ratio));
+    const Fabric classical = isotropic(*youngs_modulus, *poissons_ratio, fabric.thickness);
+    fabric.membrane = classical.membrane;
+    fabric.bending = classical.bending;
+  }
   table.done();
   return fabric;
 }
@@ -293,8 +315,22 @@ ScenePin read_pin(Table table, const std::vector<ScenePanel>& panels) {
   pin.where = table.where();
   pin.panel = panel_key(table, panels);
   pin.at = address(table, "at");
+  if (const auto hold = table.string("hold")) {
+    pin.hold.setZero();
+    for (const char c : *hold) {
+      if (c < 'x' || c > 'z' || pin.hold[c - 'x'] != 0) pin.hold.setConstant(std::numeric_limits<double>::quiet_NaN());
+      if (pin.hold.allFinite()) pin.hold[c - 'x'] = 1;
+    }
+    if (!pin.hold.allFinite() || hold->empty()) {
+      table.fail(*table.raw().get("hold"),
+                 fmt::format("hold = \"{}\": expected the components that are held, such as \"xz\" or \"y\"", *hold));
+    }
+  }
   pin.clamp = table.boolean("clamp").value_or(false);
   if (auto move = table.table("move", "move")) pin.move = read_motion(*move);
+  if (pin.move && pin.clamp && pin.partial()) {
+    table.fail(*table.raw().get("hold"), "hold: a clamp that leaves components free can't move in this version");
+  }
   pin.release = table.number("release", dimension::time, Range::nonnegative);
   table.done();
   return pin;
@@ -314,6 +350,21 @@ SceneTraction read_traction(Table table, const std::vector<ScenePanel>& panels) 
   traction.force = *force;
   table.done();
   return traction;
+}
+
+SceneForce read_force(Table table, const std::vector<ScenePanel>& panels) {
+  SceneForce load;
+  load.where = table.where();
+  load.panel = panel_key(table, panels);
+  load.at = address(table, "at");
+  if (load.at.kind != Address::Kind::corner && load.at.kind != Address::Kind::uv) {
+    table.fail(*table.raw().get("at"), fmt::format("at = \"{}\": expected corner:... or uv:...", load.at.text));
+  }
+  const auto force = table.vector<3>("force", dimension::force);
+  if (!force) table.missing("force", "a vector in N");
+  load.force = *force;
+  table.done();
+  return load;
 }
 
 // curves = [0, 1, 2]; empty where there is no such key.
@@ -607,9 +658,11 @@ void require_pins_for_rest(const Scene& scene) {
   if (!scene.rest) return;
   for (const ScenePanel& panel : scene.panels) {
     const auto holds = [&](const ScenePin& pin) { return pin.panel == panel.name && !pin.release; };
-    const auto pulls = [&](const SceneTraction& traction) { return traction.panel == panel.name; };
+    const auto pulls = [&](const auto& load) { return load.panel == panel.name; };
     if (std::ranges::any_of(scene.pins, holds)) continue;
-    if (scene.gravity.isZero(0) && scene.wind.isZero(0) && std::ranges::none_of(scene.tractions, pulls)) continue;
+    if (scene.gravity.isZero(0) && scene.wind.isZero(0) && std::ranges::none_of(scene.tractions, pulls) &&
+        std::ranges::none_of(scene.forces, pulls))
+      continue;
     throw InputError(
         fmt::format("{}: until = \"rest\", but no pin holds panel '{}' for good", panel.where, panel.name));
   }
@@ -650,6 +703,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   for (Table& table : top.tables("traction", "[[traction]]")) {
     scene.tractions.push_back(read_traction(table, scene.panels));
   }
+  for (Table& table : top.tables("force", "[[force]]")) scene.forces.push_back(read_force(table, scene.panels));
   for (Table& table : top.tables("seam", "[[seam]]")) scene.seams.push_back(read_seam(table, scene.panels));
   for (Table& table : top.tables("obstacle", "[[obstacle]]")) scene.obstacles.push_back(read_obstacle(table, path));
   read_settings(top, scene);

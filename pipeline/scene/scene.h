@@ -57,16 +57,25 @@ struct PinMotion {
 struct ScenePin {
   std::string panel;
   Address at;
+  Eigen::Vector3d hold{1, 1, 1};  // 1: component held, 0: free
   bool clamp = false;
   std::optional<PinMotion> move;
   std::optional<double> release;  // s
   std::string where;
+  bool partial() const { return hold != Eigen::Vector3d::Ones(); }
 };
 
 struct SceneTraction {
   std::string panel;
   Address along;
   Eigen::Vector3d force{0, 0, 0};  // N/m of rest length, dead
+  std::string where;
+};
+
+struct SceneForce {
+  std::string panel;
+  Address at;
+  Eigen::Vector3d force{0, 0, 0};  // N, dead
   std::string where;
 };
 
@@ -147,6 +156,7 @@ struct Scene {
   std::shared_ptr<const ReadFile> read;  // a panel's file that has been read already; null: none
   std::vector<ScenePin> pins;
   std::vector<SceneTraction> tractions;
+  std::vector<SceneForce> forces;
   std::vector<SceneSeam> seams;
   std::vector<SceneObstacle> obstacles;
   StrainLimit strain_limit;

@@ -169,7 +169,9 @@ class Parser {
 
 std::string unit_name(const Dimension& d) {
   if (d == dimension::none) return "a number";
+  if (d == dimension::force) return "N";
   if (d == dimension::force_per_length) return "N/m";
+  if (d == dimension::pressure) return "Pa";
   if (d == dimension::moment) return "N m";
   std::string above, below;
   int count_below = 0;

@@ -21,7 +21,9 @@ inline constexpr Dimension angle{0, 0, 0, 1};
 inline constexpr Dimension velocity{1, 0, -1, 0};
 inline constexpr Dimension acceleration{1, 0, -2, 0};
 inline constexpr Dimension area_density{-2, 1, 0, 0};      // kg/m2
+inline constexpr Dimension force{1, 1, -2, 0};             // N
 inline constexpr Dimension force_per_length{0, 1, -2, 0};  // N/m
+inline constexpr Dimension pressure{-1, 1, -2, 0};         // Pa
 inline constexpr Dimension moment{2, 1, -2, 0};            // N m
 inline constexpr Dimension curvature{-1, 0, 0, 0};         // 1/m
 inline constexpr Dimension area_drag{-2, 1, -1, 0};        // kg/(m2 s)

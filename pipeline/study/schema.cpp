@@ -40,6 +40,9 @@ move = {{ end = 1 }}
 [[traction]]
 along = "edge:u0"
 force = [0, 0, 1]
+[[force]]
+at = "corner:0,0"
+force = [0, 0, 1]
 [[seam]]
 a = {{ curve = 0 }}
 b = {{ curve = 1 }}

@@ -8,7 +8,10 @@
 #include <limits>
 
 #include "analysis/flat_cloth.h"
+#include "analysis/projection/fast_projection.h"
+#include "analysis/projection/lagrange_newton.h"
 #include "analysis/projection/row_matrix.h"
+#include "analysis/projection/substeps.h"
 #include "geometry/error.h"
 #include "support/near.h"
 
@@ -111,6 +114,32 @@ TEST(PrimalDual, AnyStepKeepsEveryStrainWithinTheLimit) {
       }
     }
   }
+}
+
+// Along the axes that a place row leaves free the cloth goes where the others take it, to the bit.
+TEST(PrimalDual, APlaceRowHoldsTheComponentsThatItNames) {
+  const FlatCloth c = flat_cloth(2, 6);
+  const Eigen::Vector3d axes(1, 0, 1);
+  ConstraintRows rows;
+  for (const double u : {0.0, 0.3}) {
+    const ScalarRow row = scalar_row(c, u, 0.4, 0);
+    rows.place.push_back({row, 0, [at = apply(row, c.rest)](double) { return at; }, axes});
+  }
+  PrimalDual solver(free_map(c), c.mass, rows);
+  Motion motion{c.rest, disturbed(c.rest, 1, 4) - c.rest, {}};
+  Motion free = motion;
+  free.x += 1e-2 * free.v;
+  EXPECT_TRUE(motion.step(solver, 1e-2).converged);
+  for (int k = 0; k < c.n * c.n; ++k) EXPECT_EQ(motion.x[3 * k + 1], free.x[3 * k + 1]);
+  for (int p = 0; p < 2; ++p) {
+    const Eigen::Vector3d off = apply(rows.place[p].row, motion.x) - apply(rows.place[p].row, c.rest);
+    EXPECT_LT(off.cwiseProduct(axes).norm(), 1e-9);
+    EXPECT_GT(std::abs(off.y()), 1e-4);
+    EXPECT_EQ(motion.forces.place(1, p), 0);
+  }
+  EXPECT_THROW(FastProjection(free_map(c), c.mass, rows), SolverError);
+  EXPECT_THROW(LagrangeNewton(free_map(c), c.mass, rows), SolverError);
+  EXPECT_THROW(Substeps(free_map(c), c.mass, rows), SolverError);
 }
 
 // Cloth that a step would compress by three times the limit buckles, where tensions and laws say nothing about which

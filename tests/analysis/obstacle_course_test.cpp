@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Linear shell benchmarks: Kirchhoff-Love limits of converged splines on the exact surfaces.
+#include "analysis/obstacle_course.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "support/near.h"
+
+namespace toile {
+namespace {
+
+using test::cylinder_part;
+using test::refined;
+using test::ShellProblem;
+using test::sphere_part;
+
+constexpr double right_angle = std::numbers::pi / 2, degree = std::numbers::pi / 180;
+
+Fabric shell(double youngs_modulus, double poissons_ratio, double thickness) {
+  Fabric fabric = isotropic(youngs_modulus, poissons_ratio, thickness);
+  fabric.density = 1;
+  return fabric;
+}
+
+// Equilibrium from the start in one step without inertia. Loads are small enough for the answer to be that of the
+// linear problem, and large enough to stand above rounding.
+void solve(ShellProblem& problem) {
+  problem.finish();
+  ImplicitScheme scheme(problem.system(), {}, ImplicitRule::backward_euler, {.residual = 1e-7});
+  StepWork work;
+  const StepReport report = scheme.equilibrate(problem.state, 0.1, 1e7, work);
+  EXPECT_TRUE(report.projection.converged) << report.projection.iterations;
+  EXPECT_LE(report.projection.iterations, 4);
+}
+
+// A quarter of the roof under its own weight, its ends on rigid diaphragms. [Scordelis & Lo 1964]
+double roof_edge(int p, int spans) {
+  const double share = 1e-3;
+  ShellProblem problem(refined(cylinder_part(25, 40 * degree, 25), p, spans, spans), shell(4.32e8, 0, 0.25));
+  problem.mirror_edge(0, 0, 0);
+  problem.mirror_edge(1, 0, 1);
+  problem.hold_edge(1, 1, {1, 0, 1});
+  problem.pull_area({0, 0, -90 * share});
+  solve(problem);
+  return -problem.moved(1, 0).z() / share;
+}
+
+// An eighth of the cylinder pinched at mid-length, its ends on rigid diaphragms. [Lindberg, Olson & Cowper 1969]
+double pinched_cylinder(int p, int spans) {
+  const double load = 100;
+  ShellProblem problem(refined(cylinder_part(300, right_angle, 300), p, spans, spans), shell(3e6, 0.3, 3));
+  problem.mirror_edge(0, 0, 0);
+  problem.mirror_edge(0, 1, 2);
+  problem.mirror_edge(1, 0, 1);
+  problem.hold_edge(1, 1, {1, 0, 1});
+  problem.pull(problem.edge(0, 0, 0), {0, 0, -load / 4});
+  solve(problem);
+  return -problem.moved(0, 0).z() / load;
+}
+
+// A quarter of the hemisphere pulled and pushed at its equator. [MacNeal & Harder 1985]
+double pinched_hemisphere(int p, int spans, double latitude) {
+  const double share = 4e-4;
+  ShellProblem problem(refined(sphere_part(10, latitude), p, spans, spans), shell(6.825e7, 0.3, 0.04));
+  problem.mirror_edge(0, 0, 1);
+  problem.mirror_edge(0, 1, 0);
+  if (latitude == right_angle) problem.join_edge(1, 1);
+  problem.hold(problem.edge(1, 1, 0), {0, 0, 1});
+  problem.pull(problem.edge(1, 0, 0), {share, 0, 0});
+  problem.pull(problem.edge(1, 0, problem.along(1) - 1), {0, -share, 0});
+  solve(problem);
+  return problem.moved(0, 0).x() / share;
+}
+
+TEST(ObstacleCourse, ScordelisLoRoof) {
+  expect_near_rel(roof_edge(3, 8), 0.300592457, 1e-3);
+}
+
+// At a point load splines converge with the square of the mesh alone.
+TEST(ObstacleCourse, PinchedCylinderWithEndDiaphragms) {
+  const double coarse = pinched_cylinder(3, 20), fine = pinched_cylinder(3, 40);
+  expect_near_rel(fine, 1.8282e-5, 2e-3);
+  EXPECT_GT(std::abs(coarse / 1.8282e-5 - 1) / std::abs(fine / 1.8282e-5 - 1), 3);
+}
+
+TEST(ObstacleCourse, PinchedHemisphere) {
+  expect_near_rel(pinched_hemisphere(3, 18, right_angle), 0.092414, 1e-3);
+}
+
+TEST(ObstacleCourse, PinchedHemisphereWithAHole) {
+  expect_near_rel(pinched_hemisphere(3, 17, 72 * degree), 0.0935208, 1e-3);
+}
+
+// Coarse splines of degree 2 can hardly bend a curved shell without stretching it: on 8 x 8 spans the hemisphere gives
+// a quarter of what it should. Degree 3 is much better there, and both converge.
+TEST(ObstacleCourse, MembraneLockingIsACoarseNetsAndFallsWithDegreeAndMesh) {
+  const double exact = 0.0935208;
+  const double two = pinched_hemisphere(2, 8, 72 * degree), three = pinched_hemisphere(3, 8, 72 * degree),
+               fine = pinched_hemisphere(2, 32, 72 * degree);
+  EXPECT_LT(two, 0.35 * exact);
+  EXPECT_GT(three, 0.95 * exact);
+  EXPECT_GT(fine, 0.98 * exact);
+  for (const double w : {two, three, fine}) EXPECT_LT(w, exact);
+}
+
+}  // namespace
+}  // namespace toile
