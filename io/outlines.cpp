@@ -129,6 +129,24 @@ Sides sides(const Loop& a, const Loop& b) {
   return out;
 }
 
+// The same outline drawn again, from wherever it begins and whichever way round.
+bool repeats(const Loop& a, const Loop& b, double tolerance) {
+  const std::size_t n = a.spans.size();
+  if (b.spans.size() != n || !((a.low - b.low).norm() <= tolerance && (a.high - b.high).norm() <= tolerance))
+    return false;
+  const auto from = [&](std::size_t shift, bool back) {
+    for (std::size_t k = 0; k < n; ++k) {
+      const TrimSpan& other = b.spans[back ? (shift + n - k) % n : (shift + k) % n];
+      for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0})
+        if (!((a.spans[k].at(s) - other.at(back ? 1 - s : s)).norm() <= tolerance)) return false;
+    }
+    return true;
+  };
+  for (std::size_t shift = 0; shift < n; ++shift)
+    if (from(shift, false) || from(shift, true)) return true;
+  return false;
+}
+
 // Distance of a point to a chain, from samples: for telling what a mark is, never for topology.
 double distance(const Loop& loop, const Vector2d& p) {
   double least = std::numeric_limits<double>::infinity();
@@ -353,6 +371,12 @@ void Finder::nest() {
     for (std::size_t m = 0; m < n; ++m) {
       const Loop& other = loops_[order[m]];
       if (gone[order[m]] || other.plane != loop.plane) continue;
+      if (repeats(other, loop, tolerance_)) {
+        out_.notes.push_back({loop.id, "the closed curve repeats the outline of entity " + std::to_string(other.id) +
+                                           "; it is left out"});
+        gone[order[n]] = true;
+        break;
+      }
       const Sides where = sides(other, loop);
       if (where.inside && where.outside) {
         out_.notes.push_back({loop.id, "the closed curve crosses the outline of entity " + std::to_string(other.id) +

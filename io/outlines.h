@@ -35,8 +35,9 @@ struct Outlines {
 
 // Closed chains become outlines: those inside an even number of others are panels, the others their holes.
 //   (1) curves whose ends are nearer than the joining tolerance, max(resolution, 1e-5 of the drawing's size), are
-//       joined; a curve that stays open, and a closed one that crosses an outline, is a mark; two curves that run along
-//       each other between the same ends are one drawn twice, or a slit where the outline goes on without them;
+//       joined; a curve that stays open, and a closed one that crosses an outline, is a mark; an outline drawn again is
+//       left out with a note; two curves that run along each other between the same ends are one drawn twice, or a slit
+//       where the outline goes on without them;
 //   (2) an outline in a coordinate plane keeps its coordinates bitwise as parameters, in any other plane they are
 //       Cartesian in that plane: parameter curves are the curves' own images, degree, knots and weights kept;
 //   (3) loop 0 is the outline, holes follow by id; curve K is the K-th along it from the first curve of the smallest id

@@ -31,8 +31,13 @@ PanelFile read_panels(const std::filesystem::path& path, const PanelChoice& choi
   return out;
 }
 
+void require_panels(const PanelFile& file) {
+  if (!file.panels.empty()) return;
+  if (!file.refused.empty()) throw GeometryError(file.refused.front());
+  throw InputError(file.path + ": holds no face and no surface");
+}
+
 void leave_out_invalid(PanelFile& file) {
-  const bool any = !file.panels.empty();
   std::erase_if(file.panels, [&](const TrimmedSurface& panel) {
     try {
       TrimmedSurface copy = panel;
@@ -43,7 +48,7 @@ void leave_out_invalid(PanelFile& file) {
       return true;
     }
   });
-  if (any && file.panels.empty()) throw GeometryError(file.refused.back());
+  require_panels(file);
 }
 
 }  // namespace toile

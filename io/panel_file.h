@@ -22,8 +22,11 @@ struct PanelChoice {
 // where the file holds panels and none can be.
 PanelFile read_panels(const std::filesystem::path& path, const PanelChoice& choice = {});
 
-// Panels without a valid trim go to `refused`, each with panel, loop and place. Throws GeometryError where none is
-// left.
+// Throws where the file has no panel: GeometryError with the first reason where some were refused, else InputError.
+void require_panels(const PanelFile& file);
+
+// Panels without a valid trim go to `refused`, each with panel, loop and place. Throws as require_panels() does where
+// none is left.
 void leave_out_invalid(PanelFile& file);
 
 }  // namespace toile

@@ -287,6 +287,7 @@ std::vector<std::vector<TrimCurve>> PatternReader::loops_of(const JsonValue& val
 PatternReader::ReadPanel PatternReader::read_panel(const std::string& name, const JsonValue& value) {
   where_ = "panel '" + name + "': ";
   expect(value, JsonValue::Kind::object, "a panel");
+  if (name.empty()) fail(value, "it has no name");
   labels_ = labels_ || value.find("label");
   ReadPanel out;
   if (const JsonValue* v = value.find("translation"))

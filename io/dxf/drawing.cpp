@@ -72,7 +72,7 @@ class Listener : public DL_CreationAdapter {
   }
   void addPolyline(const DL_PolylineData& p) override {
     item("POLYLINE").lines.push_back({{}, {}, p.elevation, (p.flags & 1) != 0});
-    // Meshes are other things in the same clothes; of a fitted polyline vertices come with the frame's.
+    // Meshes are other things in the same clothes.
     if ((p.flags & (16 | 64)) != 0) item_->lines.clear();
     below_ = from_below();  // the vertices of a POLYLINE are entities of their own that don't say it
   }

@@ -29,7 +29,9 @@ const Words& announced_entities() {
 
 class Cutter {
  public:
-  Cutter(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+  Cutter(std::string_view text, const std::string& name) : text_(text), name_(name) {
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);  // a byte order mark
+  }
 
   Pairs run() {
     while (!ended_) {
@@ -75,7 +77,12 @@ class Cutter {
     if (!keep_) return;
     const double number = code >= 10 && code <= 59 && section_ != "HEADER" ? checked_number(code, value) : 0;
     if (entity_ == "SPLINE" && code != 0 && !spline(code, number, value)) return;
+    if (code == 0) entity_begin_ = out_.text.size();
     out_.text += std::to_string(code) + "\n" + value + "\n";
+    if (entity_ == "VERTEX" && code == 70 && is_frame(value)) {
+      out_.text.resize(entity_begin_);
+      keep_ = false;
+    }
     if (code == 0 && announced_entities().contains(value)) out_.lines.push_back(line_ - 1);
   }
 
@@ -113,6 +120,13 @@ class Cutter {
     return number;
   }
 
+  // A control point of the curve that a spline-fitted polyline also gives as vertices.
+  static bool is_frame(const std::string& value) {
+    int flags = 0;
+    std::from_chars(value.data(), value.data() + value.size(), flags);
+    return (flags & 16) != 0;
+  }
+
   // False for pairs that dxflib shall not see: the numbers themselves, and what they are counted by.
   bool spline(int code, double number, const std::string& value) {
     Spline& s = out_.splines.back();
@@ -146,6 +160,7 @@ class Cutter {
   int line_ = 0;
   std::string section_, entity_, variable_;
   bool keep_ = true, ended_ = false;
+  std::size_t entity_begin_ = 0;  // of out_.text
   Pairs out_;
 };
 

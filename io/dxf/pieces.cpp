@@ -14,7 +14,7 @@ namespace toile::dxf {
 
 namespace {
 
-constexpr int max_depth = 8;                  // of blocks inserted in blocks
+constexpr std::size_t max_depth = 8;          // of blocks inserted in blocks
 constexpr std::size_t max_items = 2'000'000;  // of a piece, inserted ones included
 
 std::string lower(std::string text) {
@@ -34,7 +34,8 @@ class Expander {
   }
   std::vector<Item> items(const Block& block, const Affine& map, bool inserts = true) const {
     std::vector<Item> out;
-    add(block, map, inserts, 0, out);
+    std::vector<const Block*> within;
+    add(block, map, inserts, within, out);
     return out;
   }
   // A block's coordinates to those of where it is inserted.
@@ -43,7 +44,10 @@ class Expander {
   }
 
  private:
-  void add(const Block& block, const Affine& map, bool inserts, int depth, std::vector<Item>& out) const {
+  // `within`: the blocks that this one is inserted in; none of them is inserted again.
+  void add(const Block& block, const Affine& map, bool inserts, std::vector<const Block*>& within,
+           std::vector<Item>& out) const {
+    within.push_back(&block);
     const bool identity = map.linear.isIdentity(0) && map.shift.isZero(0);
     for (const Item& item : block.items) {
       if (out.size() >= max_items) return;
@@ -51,9 +55,11 @@ class Expander {
         out.push_back(identity ? item : mapped(map, item));
         continue;
       }
-      const Block* inner = inserts && depth < max_depth ? find(item.insert->block) : nullptr;
-      if (inner) add(*inner, map * placing(*item.insert, *inner), inserts, depth + 1, out);
+      const Block* inner = inserts && within.size() <= max_depth ? find(item.insert->block) : nullptr;
+      if (inner && std::ranges::find(within, inner) == within.end())
+        add(*inner, map * placing(*item.insert, *inner), inserts, within, out);
     }
+    within.pop_back();
   }
   const Drawing& drawing_;
   std::map<std::string, const Block*> blocks_;
@@ -130,6 +136,21 @@ std::vector<Piece> pieces_of(const Drawing& drawing) {
   return out;
 }
 
+bool holds(const Drawing& drawing, const std::string& outer, const std::string& inner) {
+  std::vector<std::string> open{outer};
+  std::set<std::string> seen{outer};
+  while (!open.empty()) {
+    const std::string name = std::move(open.back());
+    open.pop_back();
+    if (name == inner) return true;
+    for (const Block& block : drawing.blocks)
+      for (const Item& item : block.items)
+        if (block.name == name && item.insert && seen.insert(item.insert->block).second)
+          open.push_back(item.insert->block);
+  }
+  return false;
+}
+
 std::optional<std::string> value_of(const std::string& text, std::string_view key) {
   if (text.size() <= key.size()) return std::nullopt;
   for (std::size_t k = 0; k < key.size(); ++k)
@@ -194,9 +215,9 @@ Unit unit_of(const Drawing& drawing, std::string& warning) {
     warning = "the units are '" + *text + "', which is no unit known here; " + other(stated.value_or(Unit{"MM", 1e-3}));
   if (stated) return *stated;
   if (!text)
-    warning =
-        "no text 'Units: METRIC' or 'Units: ENGLISH' and no $INSUNITS; millimetres are assumed: unit = \"...\" chooses "
-        "others";
+    warning = "no text 'Units: METRIC' or 'Units: ENGLISH' and " +
+              (insunits > 0 ? "$INSUNITS = " + std::to_string(insunits) + " is no unit known here" : "no $INSUNITS") +
+              "; millimetres are assumed: unit = \"...\" chooses others";
   return {"MM", 1e-3};
 }
 

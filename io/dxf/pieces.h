@@ -28,6 +28,9 @@ struct Piece {
 // nobody inserts; what stands outside of blocks, first.
 std::vector<Piece> pieces_of(const Drawing& drawing);
 
+// Is the block `inner` the block `outer`, or inserted in it, in blocks of it and so on?
+bool holds(const Drawing& drawing, const std::string& outer, const std::string& inner);
+
 // "Piece Name: FRONT" -> "FRONT" for the key "piece name", capitals or not.
 std::optional<std::string> value_of(const std::string& text, std::string_view key);
 // The value of the first text of the drawing with that key.

@@ -41,7 +41,7 @@ const TrimmedSurface* by_name(const PanelFile& file, const std::string& name) {
 
 // The face that a scene's panel means: by name, else by order.
 const TrimmedSurface& select_face(const PanelFile& file, const ScenePanel& panel) {
-  if (file.panels.empty()) throw InputError(fmt::format("{}: holds no face and no surface", file.path));
+  require_panels(file);
   if (panel.named) {
     if (const TrimmedSurface* face = by_name(file, panel.name)) return *face;
     if (const TrimmedSurface* face = by_name(file, panel.name + std::string(flat_suffix))) return *face;

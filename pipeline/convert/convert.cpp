@@ -70,7 +70,7 @@ std::string refined_iges(const PanelFile& file, const InspectOptions& options) {
 
 std::string iges_text(const PanelFile& file, const std::string& name, const InspectOptions& options, bool some,
                       Conversion& out) {
-  if (!file.file || file.panels.empty() || some) return new_iges(file, options, name, out);
+  if (!file.file || some) return new_iges(file, options, name, out);
   if (!asks(options)) {
     out.notes.push_back("every record is the source's own");
     return format_iges(file);
@@ -256,7 +256,6 @@ Conversion convert(const PanelFile& source, const std::filesystem::path& target,
   }
   PanelFile file = source;
   leave_out_invalid(file);
-  if (file.panels.empty() && !iges) throw InputError(fmt::format("{}: holds no face and no surface", file.path));
   const std::vector<std::size_t> panels = chosen(file, options.only);
   const bool some = panels.size() < file.panels.size();
   Conversion out;

@@ -296,6 +296,9 @@ TEST(Dxf, TheUnitIsWhatTheFileSays) {
   EXPECT_TRUE(parse_dxf(file(piece, metric), "u.dxf").warnings.empty());
   EXPECT_EQ(parse_dxf(file(piece, metric, inch), "u.dxf").warnings.size(), 1u) << "they disagree";
   EXPECT_EQ(parse_dxf(file(piece, words("Units: M")), "u.dxf").warnings.size(), 1u) << "a piece of 400 m";
+  const PanelFile decimetres = parse_dxf(file(piece, "", "  9\n$INSUNITS\n 70\n14\n"), "u.dxf");
+  ASSERT_EQ(decimetres.warnings.size(), 1u);
+  EXPECT_NE(decimetres.warnings[0].find("$INSUNITS = 14 is no unit known here; millimetres"), std::string::npos);
 }
 
 TEST(Dxf, SewLinesAreMarksOrTheOutline) {
@@ -385,6 +388,28 @@ TEST(Dxf, PiecesLieAsTheyAreInserted) {
   outer.insert(outer.find("  0\nENDBLK"), insert("IN", " 41\n2\n 42\n2\n"));
   expect_near_rel(square_metres(parse_dxf(file(inner + outer, insert("A") + metric), "i.dxf")), (200 - 16) * 1e-6,
                   1e-12);
+}
+
+TEST(Dxf, ABlockWithinItselfIsReadOnce) {
+  const std::string piece = poly("1", rectangle, true);
+  const PanelFile within = one_piece(piece + insert("A"));
+  ASSERT_EQ(within.panels.size(), 1u);
+  ASSERT_EQ(within.warnings.size(), 1u);
+  EXPECT_NE(within.warnings[0].find("INSERT: block 'A' holds block 'A'"), std::string::npos) << within.warnings[0];
+  const PanelFile around = parse_dxf(
+      file(block("A", piece + insert("B")) + block("B", insert("A") + insert("A")), insert("A") + metric), "p.dxf");
+  ASSERT_EQ(around.panels.size(), 1u);
+  EXPECT_EQ(around.warnings.size(), 3u);
+}
+
+TEST(Dxf, VerticesOfAFittedPolylinesFrameAreNoCorners) {
+  // The curve's vertices after the frame's, told by bit 16 of their flags.
+  std::string fitted = "  0\nPOLYLINE\n  8\n1\n 66\n1\n 70\n5\n 75\n6\n";
+  for (const Vector2d& p : rectangle) fitted += "  0\nVERTEX\n  8\n1\n" + xy(p.x(), p.y()) + " 70\n16\n";
+  for (const Vector2d& p : {Vector2d(150, 0), Vector2d(300, 200), Vector2d(150, 400), Vector2d(0, 200)})
+    fitted += "  0\nVERTEX\n  8\n1\n" + xy(p.x(), p.y()) + " 70\n8\n";
+  const PanelFile of = one_piece(fitted + "  0\nSEQEND\n");
+  expect_near_rel(area(of.panels.at(0)), 300 * 400 / 2, 1e-14);
 }
 
 TEST(Dxf, ArcsKeepTheirShapeUnderAnyMap) {
@@ -525,6 +550,12 @@ TEST(Dxf, NamesAreUtf8WhateverTheFileIsWrittenIn) {
   EXPECT_EQ(name("\\U+00C4RMEL"), "\u00c4RMEL");
   EXPECT_EQ(name("\xd0\xf3\xea\xe0\xe2", "ANSI_1251"), "\u0420\u0443\u043a\u0430\u0432");
   EXPECT_EQ(name("\xba\xf3\xc6\xac", "ANSI_936"), "\u540e\u7247");
+}
+
+TEST(Dxf, AByteOrderMarkIsNoPartOfTheFile) {
+  const PanelFile of =
+      parse_dxf("\xEF\xBB\xBF" + file(block("A", poly("1", rectangle, true)), insert("A") + metric), "p.dxf");
+  EXPECT_EQ(of.panels.size(), 1u);
 }
 
 TEST(Dxf, ATruncatedFileIsRefusedWithItsPlace) {

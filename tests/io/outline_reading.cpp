@@ -151,6 +151,35 @@ TEST(Outlines, AClosedCurveAcrossAnOutlineIsAMark) {
   EXPECT_NE(found.notes[0].what.find("crosses the outline of entity 1"), std::string::npos);
 }
 
+// Exporters draw a boundary on two layers, or twice on one.
+TEST(Outlines, AnOutlineDrawnAgainIsOnePanel) {
+  // Middles of these edges are rounded: they lie on neither side of the line for sure.
+  const std::vector<Vector2d> corners{{0.1, 0.2}, {97.3, 3.7}, {133.1, 61.9}, {41.7, 88.3}, {-7.9, 40.3}};
+  double twice = 0;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const Vector2d a = corners[k], b = corners[(k + 1) % corners.size()];
+    twice += a.x() * b.y() - a.y() * b.x();
+  }
+  for (const bool back : {false, true}) {
+    for (std::size_t shift = 0; shift < corners.size(); ++shift) {
+      std::vector<Vector2d> again = corners;
+      std::rotate(again.begin(), again.begin() + static_cast<std::ptrdiff_t>(shift), again.end());
+      if (back) std::reverse(again.begin(), again.end());
+      const Outlines found = find_outlines({polygon(1, corners), polygon(2, again), square(3, 20, 20, 10)}, {}, 0);
+      ASSERT_EQ(found.panels.size(), 1u) << shift << back;
+      expect_near_rel(area(found.panels[0]), twice / 2 - 100, 1e-13);
+      ASSERT_EQ(found.notes.size(), 1u) << shift << back;
+      EXPECT_EQ(found.notes[0].id, 2);
+      EXPECT_NE(found.notes[0].what.find("repeats the outline of entity 1"), std::string::npos) << found.notes[0].what;
+    }
+  }
+  // A hole drawn twice is one, and a like outline beside it a panel of its own.
+  const Outlines holes =
+      find_outlines({square(1, 0, 0, 10), square(2, 2, 2, 3), square(3, 2, 2, 3), square(4, 20, 0, 10)}, {}, 0);
+  ASSERT_EQ(holes.panels.size(), 2u);
+  expect_near_rel(area(holes.panels[0]), 91, 1e-14);
+}
+
 TEST(Outlines, LooseEndsAndForksAreReported) {
   LooseCurve open = square(1, 0, 0, 10);
   open.pieces.pop_back();

@@ -245,6 +245,9 @@ TEST(Pattern, ABadPanelIsLeftOutAndNamed) {
   open.replace(open.find(", {\"endpoints\": [3, 0]}"), 23, "");
   EXPECT_NE(parse_pattern(squares(1, "", open), "s.json").file.refused.at(0).find("its edges don't close"),
             std::string::npos);
+  std::string nameless = bow;
+  nameless.replace(nameless.find("bow"), 3, "");
+  EXPECT_EQ(parse_pattern(squares(1, "", nameless), "s.json").file.refused.at(0), "s.json:2: panel '': it has no name");
   // Alone it is an error, of geometry.
   std::string alone = squares(0, "", bow);
   alone.replace(alone.find(",\n\"bow"), 2, "");

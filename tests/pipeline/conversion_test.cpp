@@ -70,6 +70,22 @@ TEST(Convert, OnlyTheNamedPanelsAreWritten) {
   }
 }
 
+TEST(Convert, AFileWithoutPanelsGivesNone) {
+  PanelFile file;
+  file.path = "in.dxf";
+  for (const char* target : {"out.igs", "out.svg", "out.obj", "out.json"})
+    EXPECT_THROW(convert(file, target), InputError);
+  file.refused = {"in.dxf:3: the outline is open", "in.dxf:9: it crosses itself"};
+  for (const char* target : {"out.igs", "out.svg", "out.obj", "out.json"}) {
+    try {
+      convert(file, target);
+      ADD_FAILURE() << target;
+    } catch (const GeometryError& error) {
+      EXPECT_EQ(std::string(error.what()), file.refused[0]);
+    }
+  }
+}
+
 TEST(Convert, ADrapeHasTheTrianglesAndTheTextureOfItsPattern) {
   const PanelFile file = drape_of_two();
   const auto alone = [&](const char* name) {
