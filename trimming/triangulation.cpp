@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "trimming/triangulation.h"
 
-#include <CGAL/Constrained_Delaunay_triangulation_2.h>
-#include <CGAL/Constrained_triangulation_face_base_2.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Triangulation_face_base_with_info_2.h>
-#include <CGAL/Triangulation_vertex_base_with_info_2.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -15,6 +9,7 @@
 
 #include "geometry/error.h"
 #include "geometry/finite.h"
+#include "trimming/delaunay.h"
 #include "trimming/text.h"
 
 namespace toile {
@@ -23,14 +18,6 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<int, Kernel>;  // into TrimmedTriangles::uv
-using FaceBase =                                                              // nesting depth: odd in the material
-    CGAL::Constrained_triangulation_face_base_2<Kernel, CGAL::Triangulation_face_base_with_info_2<int, Kernel>>;
-using Delaunay =
-    CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>,
-                                               CGAL::Exact_predicates_tag>;
 
 constexpr double most_triangles = 4e6;
 
@@ -70,7 +57,7 @@ class Mesher {
     constexpr int rounds = 12;
     for (int round = 0; !constrain(round == rounds); ++round) {
     }
-    mark_depths();
+    mark_depths(delaunay_);
     refine();
     collect();
     return std::move(out_);
@@ -319,24 +306,6 @@ class Mesher {
     rings_ = std::move(finer);
   }
 
-  // Nesting depth of the faces, counted by the constraints between them and the outside.
-  void mark_depths() {
-    for (auto face = delaunay_.all_faces_begin(); face != delaunay_.all_faces_end(); ++face) face->info() = -1;
-    std::vector<Delaunay::Face_handle> now{delaunay_.infinite_face()}, next;
-    for (int depth = 0; !now.empty(); ++depth, now.swap(next), next.clear()) {
-      while (!now.empty()) {
-        const Delaunay::Face_handle face = now.back();
-        now.pop_back();
-        if (face->info() >= 0) continue;
-        face->info() = depth;
-        for (int k = 0; k < 3; ++k) {
-          const Delaunay::Face_handle neighbour = face->neighbor(k);
-          if (neighbour->info() < 0) (face->is_constrained(k) ? next : now).push_back(neighbour);
-        }
-      }
-    }
-  }
-
   bool inside(Delaunay::Face_handle f) const { return !delaunay_.is_infinite(f) && f->info() % 2 == 1; }
 
   std::array<double, 3> edges(Delaunay::Face_handle f) const {
@@ -378,7 +347,7 @@ class Mesher {
       tasks.pop_front();
       Delaunay::Face_handle face;
       if (!delaunay_.is_face(task.a, task.b, task.c, face)) continue;
-      const Kernel::Point_2 x = delaunay_.circumcenter(face);
+      const PlaneKernel::Point_2 x = delaunay_.circumcenter(face);
       if (!std::isfinite(x.x()) || !std::isfinite(x.y())) continue;  // of corners on a line but for rounding
       Delaunay::Locate_type type;
       int index = 0;
