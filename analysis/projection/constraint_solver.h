@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <memory>
+#include <vector>
 
 #include "analysis/constraint/constraint_rows.h"
 #include "geometry/fields.h"
@@ -26,12 +27,23 @@ struct ProjectionReport {
   double tightened = 0;       // J, energy of the limits by rows that grew stiffer in the step
   double within = 1;          // part of the strain rows, by area, that meets its limit: where a percentile is held
   double energy = 0;          // J, of the limit laws at the end
+  int contacts = 0;           // at work at the end
+  double contact_work = 0;    // J, of moving obstacles on the cloth
   double factor_seconds = 0;  // wall time of the numeric factorisations
   double solve_seconds = 0;   // and of the solutions by them
 };
 void fields(auto& archive, Like<ProjectionReport> auto& r) {
   archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.within, r.energy,
-          r.tightened);
+          r.tightened, r.contacts, r.contact_work);
+}
+
+// Contacts at work at one time. Friction holds each to an anchor, a point of the obstacle.
+struct ContactForces {
+  std::vector<int> key;            // four numbers each, ascending (ContactRow::key)
+  Eigen::Matrix3Xd force, anchor;  // N, that moves the candidate; m
+};
+void fields(auto& archive, Like<ContactForces> auto& f) {
+  archive(f.key, f.force, f.anchor);
 }
 
 // Constraint forces at one time: where a solver goes on from. Empty where there were none.
@@ -40,9 +52,10 @@ struct ConstraintForces {
   Eigen::Matrix3Xd place;  // N, per place row
   // Per strain row: how many times as stiff as at the start it is, and for how long it has been beyond its limit [s].
   Eigen::VectorXd stiffening, beyond;
+  ContactForces contact;
 };
 void fields(auto& archive, Like<ConstraintForces> auto& f) {
-  archive(f.strain, f.place, f.stiffening, f.beyond);
+  archive(f.strain, f.place, f.stiffening, f.beyond, f.contact);
 }
 
 // What the last step left behind, for reactions.
@@ -53,9 +66,12 @@ struct ProjectionMemory {
   Eigen::Matrix3Xd place_multipliers;
   // Multiplier times direction, summed over the iterations [kg m]: control point I was pushed by -d_I times its column.
   Eigen::Matrix3Xd strain_impulses;
+  // Of contacts [kg m]: on the body's points (3 n, empty without obstacles) and, per obstacle, on the cloth.
+  Eigen::VectorXd contact = {};
+  Eigen::Matrix3Xd by_obstacle = {};
 };
 void fields(auto& archive, Like<ProjectionMemory> auto& m) {
-  archive(m.strain_multipliers, m.place_multipliers, m.strain_impulses);
+  archive(m.strain_multipliers, m.place_multipliers, m.strain_impulses, m.contact, m.by_obstacle);
 }
 inline ProjectionMemory no_impulses(const ConstraintRows& rows) {
   const auto strains = static_cast<Eigen::Index>(rows.strain.size()),
@@ -79,11 +95,17 @@ class ConstraintSolver {
   virtual ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
                                 const Eigen::Ref<const Eigen::VectorXd>& start, double dt,
                                 ConstraintForces& forces) = 0;
+  // The last step once more, for another x and v, from its own result: `forces` are those of its start again.
+  virtual ProjectionReport again(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                                 const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) {
+    return step(x, v, t, start, dt, forces);
+  }
   // Whether v then has all of the constraints' impulse, so that cloth at rest has v = 0; else it has what moves the
   // candidate, over dt: half of it.
   virtual bool end_velocity() const { return false; }
-  // Once v is whole, with the cloth's own forces at t too: takes out of it what the next step can't resolve.
-  virtual void settle(Eigen::Ref<Eigen::VectorXd>, double) {}
+  // Once v is whole, with the cloth's own forces at t too: takes out of it what the next step can't resolve. The work
+  // that moving obstacles do by it [J].
+  virtual double settle(Eigen::Ref<Eigen::VectorXd>, double) { return 0; }
   // Largest part of the cloth's own stable step that a step should take.
   virtual double step_share() const { return 1; }
   // How far x is from the constraints, nothing moved.
@@ -110,7 +132,8 @@ inline bool ConstraintSolver::restore(const ProjectionMemory& from) {
   const ProjectionMemory& to = memory();
   if (from.strain_multipliers.size() != to.strain_multipliers.size() ||
       from.strain_impulses.cols() != to.strain_impulses.cols() ||
-      from.place_multipliers.cols() != to.place_multipliers.cols())
+      from.place_multipliers.cols() != to.place_multipliers.cols() || from.contact.size() != to.contact.size() ||
+      from.by_obstacle.cols() != to.by_obstacle.cols())
     return false;
   set_memory(from);
   return true;

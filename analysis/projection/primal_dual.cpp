@@ -49,7 +49,7 @@ struct PrimalDual::Impl {
   Eigen::Matrix3Xd y, targets, fixed_places, gap, change;  // change: D dx
   Eigen::VectorXd strain, missed, slope;                   // per strain row: C, C - law(lambda), 1 / (dC / dlambda)
   Eigen::VectorXd guess, force, rhs, solution, trial;      // guess: where inertia alone would lead
-  Eigen::VectorXd held, part;
+  Eigen::VectorXd held, part, answer;
   Eigen::VectorXd friction, strain_before;  // per strain row: N m per strain, and the strain at the start
   Eigen::Matrix3Xd pins_later, pin_velocity, row_velocity;
   Eigen::VectorXd place_compliance;  // m/N
@@ -59,8 +59,8 @@ struct PrimalDual::Impl {
   // |M^-1/2 force|: at work at the start of the step, of rounded places, what may be left of a step.
   double reference = 0, rounding = 0, allowed = 0;
   double tau = 0;
-  bool has_matrix = false, factored = false;  // of this step; whether by a factor
-  ProjectionMemory memory;
+  bool has_matrix = false, factored = false;   // of this step; whether by a factor
+  ProjectionMemory memory, half_memory;        // of the whole step; of the forces at its start
   std::unique_ptr<FastProjection> projection;  // made where a start breaks the limits
 
   Impl(const AffineMap& m, const Eigen::VectorXd& node_mass, ConstraintRows r, const PrimalDualOptions& o,
@@ -126,7 +126,7 @@ struct PrimalDual::Impl {
   void set_matrix();
   bool factorise(const Eigen::Ref<const Eigen::VectorXd>& x);
   bool solve(const Eigen::Ref<const Eigen::VectorXd>& x, bool anew, ProjectionReport& report);
-  bool iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
+  bool iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report, bool goes_on = false);
   bool search(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report);
   // Notes down what the rows' forces at the present y add to the impulses.
   void act(double weight) {
@@ -137,6 +137,9 @@ struct PrimalDual::Impl {
   void move_pins(double t);
   double merit(const Eigen::Ref<const Eigen::VectorXd>& x);
   double limit_energy();
+  const Eigen::VectorXd& end(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                             const Eigen::Ref<const Eigen::VectorXd>& start, double dt, const Eigen::VectorXd& from,
+                             bool goes_on, ConstraintForces& forces, ProjectionReport& report);
 };
 
 // y, C and how far from the limits and pins they are.
@@ -276,8 +279,8 @@ void PrimalDual::Impl::set_slopes() {
   });
 }
 
-// Newton's method on places and multipliers.
-bool PrimalDual::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report) {
+// Newton's method on places and multipliers. `goes_on`: from an answer, by the factor at hand.
+bool PrimalDual::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& report, bool goes_on) {
   bool old = false;
   double last = 0;
   for (int k = 0;; ++k) {
@@ -286,7 +289,7 @@ bool PrimalDual::Impl::iterate(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& 
     if (k >= std::min(patience, options.max_iterations) || !std::isfinite(left)) return false;
     set_slopes();
     // Near the answer the factor at hand leads on, as long as it gains.
-    const bool anew = k == 0 || !factored || left > near || (old && left > gain * last);
+    const bool anew = !factored || (goes_on && k == 0 ? false : k == 0 || left > near || (old && left > gain * last));
     old = !anew;
     last = left;
     if (!solve(x, anew, report)) return false;
@@ -397,23 +400,45 @@ ProjectionReport PrimalDual::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eige
   s.reference = std::max(2 / (dt * dt) * std::sqrt(own), s.weighted_norm(s.held));
   s.rounding = place_rounding * std::sqrt(size) / tau2;
   for (int k = 0; k < s.mass.size(); ++k) s.held.segment<3>(3 * k) *= tau2 / s.mass[k];
-  v -= 2 / dt * x;
-  s.guess = x - s.held;
-  x = -start - dt * v;  // x0 + dt v0: a better start for Newton's method than forces that rows don't resolve
-  s.at(t);
-  bool solved = s.iterate(x, report);
-  if (!solved) {
-    x = start;
-    solved = s.search(x, report) && s.iterate(x, report);
-  }
-  v += 2 / dt * x;
-  s.act(0.5 * dt * dt);
-  s.memory.strain_multipliers = dt * dt * s.lambda;
-  forces.strain = s.lambda;
-  forces.place = s.mu;
-  report.energy = s.limit_energy();
-  report.converged = report.converged && solved;
+  s.half_memory = s.memory;
+  x = s.end(x, v, t, start, dt, 2 * x - dt * v - start, false, forces, report);
   return report;
+}
+
+ProjectionReport PrimalDual::again(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                                   const Eigen::Ref<const Eigen::VectorXd>& start, double dt,
+                                   ConstraintForces& forces) {
+  Impl& s = *impl_;
+  if (!s.has_matrix || s.mass.size() == 0) return step(x, v, t, start, dt, forces);
+  ProjectionReport report;
+  s.memory = s.half_memory;
+  x = s.end(x, v, t, start, dt, s.answer, true, forces, report);
+  return report;
+}
+
+// The end of a step from the candidate x, v, by Newton's method from `from`. (The header's equation; `held` is its
+// first sum.)
+const Eigen::VectorXd& PrimalDual::Impl::end(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> v,
+                                             double t, const Eigen::Ref<const Eigen::VectorXd>& start, double dt,
+                                             const Eigen::VectorXd& from, bool goes_on, ConstraintForces& forces,
+                                             ProjectionReport& report) {
+  guess = x - held;
+  v -= 2 / dt * x;
+  if (!goes_on) answer = from;
+  at(t);
+  bool solved = iterate(answer, report, goes_on);
+  if (!solved) {
+    answer = start;
+    solved = search(answer, report) && iterate(answer, report);
+  }
+  v += 2 / dt * answer;
+  act(0.5 * dt * dt);
+  memory.strain_multipliers = dt * dt * lambda;
+  forces.strain = lambda;
+  forces.place = mu;
+  report.energy = limit_energy();
+  report.converged = report.converged && solved;
+  return answer;
 }
 
 void PrimalDual::Impl::take(ConstraintForces& forces) {
@@ -473,14 +498,14 @@ ProjectionReport PrimalDual::minimise(Eigen::VectorXd& x, const Eigen::VectorXd&
   return report;
 }
 
-void PrimalDual::settle(Eigen::Ref<Eigen::VectorXd> v, double t) {
+double PrimalDual::settle(Eigen::Ref<Eigen::VectorXd> v, double t) {
   Impl& s = *impl_;
-  if (s.mass.size() == 0 || s.size() == 0) return;
+  if (s.mass.size() == 0 || s.size() == 0) return 0;
   if (!s.has_matrix) {
     s.set_slopes();
     s.set_matrix();
     s.factored = s.places() > 0 || s.matrix.stiffening() > easy;
-    if (s.factored && !s.matrix.factorise()) return;
+    if (s.factored && !s.matrix.factorise()) return 0;
   }
   s.move_pins(t);
   s.part = v;
@@ -501,6 +526,7 @@ void PrimalDual::settle(Eigen::Ref<Eigen::VectorXd> v, double t) {
     s.row_velocity.setZero();
   }
   v -= s.part;
+  return 0;
 }
 
 // Velocities of what is prescribed: of strain rows what moved control points add to D v, of place rows their targets'

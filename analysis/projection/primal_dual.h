@@ -59,6 +59,8 @@ class PrimalDual final : public ConstraintSolver {
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) override;  // FastProjection's
   ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
                         const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) override;
+  ProjectionReport again(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
+                         const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) override;
   bool end_velocity() const override { return true; }
   // f += J^T of `forces` at x and time t; memory() then holds them as if a step of 1 s had ended there.
   void add_forces(const Eigen::VectorXd& x, double t, ConstraintForces& forces, Eigen::VectorXd& f);
@@ -67,7 +69,7 @@ class PrimalDual final : public ConstraintSolver {
   // with.
   ProjectionReport minimise(Eigen::VectorXd& x, const Eigen::VectorXd& guess, double tau, double t,
                             SmoothEnergy& smooth, double reference, ConstraintForces& forces);
-  void settle(Eigen::Ref<Eigen::VectorXd> v, double t) override;
+  double settle(Eigen::Ref<Eigen::VectorXd> v, double t) override;
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
   double energy(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;
   const ProjectionMemory& memory() const override;

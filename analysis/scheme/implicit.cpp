@@ -210,9 +210,7 @@ DynamicState& ImplicitScheme::begin(const DynamicState& state, double dt, StepWo
   next.x = state.x;
   next.v = state.v;
   s.forces = state.constraint;
-  const auto rows = static_cast<Eigen::Index>(s.newton.rows().strain.size()),
-             places = static_cast<Eigen::Index>(s.newton.rows().place.size());
-  s.impulses = {Vector::Zero(rows), Eigen::Matrix3Xd::Zero(3, places), Eigen::Matrix3Xd::Zero(3, rows)};
+  s.impulses = no_impulses(s.newton.rows());
   Vector loads(3 * s.system.map->nodes());
   s.system.map->reduce(s.system.loads.force, loads, s.system.workers);
   double size = 0;

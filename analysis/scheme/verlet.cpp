@@ -54,6 +54,7 @@ void add_constraint_forces(const MechanicalSystem& system, double dt, Vector& f,
     const Eigen::Vector3d impulse = last.strain_impulses.col(r);
     if (!impulse.isZero(0)) add(row, -per_step * impulse, f);
   }
+  if (last.contact.size() > 0) f += per_step * last.contact;
   place.resize(3, static_cast<Eigen::Index>(rows.place.size()));
   for (std::size_t p = 0; p < rows.place.size(); ++p) {
     const ScalarRow& row = rows.place[p].row;
@@ -163,7 +164,7 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
     work.sums[static_cast<std::size_t>(index)].load_work =
         piece(system.loads.force).dot(piece(next.q) - piece(state.q));
   });
-  if (report.at_end) system.projection->settle(next.v, next.t);
+  if (report.at_end) report.projection.contact_work += system.projection->settle(next.v, next.t);
   share_pieces(system.workers, end_velocity ? nodes : 0, [&](int index, int begin, int end) {
     for (int k = begin; k < end; ++k)
       work.sums[static_cast<std::size_t>(index)].kinetic_end +=
@@ -180,7 +181,8 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
   }
   report.finite = report.finite && std::isfinite(report.kinetic) && std::isfinite(report.elastic.total());
   if (!report.finite) return report;
-  report.motion_work = motion_work(system, state, next, work) + report.projection.tightened;
+  report.motion_work =
+      motion_work(system, state, next, work) + report.projection.tightened + report.projection.contact_work;
   std::swap(state, next);
   return report;
 }
