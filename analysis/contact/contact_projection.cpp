@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "analysis/contact/anderson.h"
+#include "analysis/contact/bounds_tree.h"
 #include "analysis/parallel/workers.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
@@ -18,7 +19,8 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Nodes = Eigen::Ref<VectorXd>;
 
-constexpr int vertex_to_face = 0;  // kinds of contact
+// Kinds of contact: of the cloth's vertices, edges and triangles with faces, sharp edges and vertices of an obstacle.
+enum Kind { vertex_to_face, edge_to_edge, face_to_vertex };
 
 constexpr double stiffness = 100;            // a contact yields by 1 / this of its offset under its own weight
 constexpr double deep = 0.1;                 // of the offset: a start nearer than this is moved off slowly
@@ -26,6 +28,7 @@ constexpr double normal_tolerance = 0.02;    // of the offset
 constexpr double tangent_tolerance = 0.002;  // of acceleration dt^2, and of acceleration dt for velocities
 constexpr double inner_tolerance = 0.1;      // of these, within a round
 constexpr double least_offset = 1e-5;        // m, that displacements are compared with
+constexpr double parallel = 0.05;            // sine of the angle below which edges meet nowhere in particular
 constexpr double spare = 0.02;               // m, that a vertex may move before it is looked at again, at least
 constexpr int most_sweeps = 200, refreshed_rounds = 2, depth = 4;
 
@@ -35,13 +38,39 @@ Vector3d sum_of(const std::vector<std::pair<int, double>>& row, const Nodes& x) 
   return y;
 }
 
-Vector3d within(const Vector3d& v, double limit) {
+std::vector<Box> boxes(std::span<const Segment> edges) {
+  std::vector<Box> out;
+  for (const Segment& edge : edges) out.push_back(Box(edge.from).extend(edge.to));
+  return out;
+}
+std::vector<Box> boxes(std::span<const Vector3d> vertices) {
+  return {vertices.begin(), vertices.end()};
+}
+
+Vector3d shortened(const Vector3d& v, double limit) {
   const double length = v.norm();
   return length > limit ? Vector3d(v * (limit / length)) : v;
 }
 
 Vector3d across(const Vector3d& v, const Vector3d& normal) {
   return v - normal.dot(v) * normal;
+}
+
+// The nearest point of an obstacle, seen from the side that the cloth is on.
+struct Meeting : SurfacePoint {
+  int side = 1;
+};
+// `side` 0: the side of p, of an obstacle that has two; else the outside.
+std::optional<Meeting> nearest(const Obstacle& obstacle, const Vector3d& p, double reach, int side) {
+  const std::optional<SurfacePoint> near = obstacle.nearest(p, reach);
+  if (!near) return std::nullopt;
+  Meeting out{*near, side};
+  if (side == 0) out.side = obstacle.closed() || near->distance >= 0 ? 1 : -1;
+  if (out.side < 0) {
+    out.normal = -out.normal;
+    out.distance = -out.distance;
+  }
+  return out;
 }
 
 }  // namespace
@@ -64,6 +93,10 @@ struct ContactProjection::Impl {
   // Per obstacle and vertex: where it was looked at, and how far from there nothing is near.
   std::vector<Matrix3Xd> looked_at;
   std::vector<VectorXd> clear;
+  struct Sharp {  // of an obstacle
+    BoundsTree edges, vertices;
+  };
+  std::vector<Sharp> sharp;
   ProjectionMemory memory;
   Counts counts;
 
@@ -75,6 +108,7 @@ struct ContactProjection::Impl {
       obstacles.push_back(obstacle.get());
       looked_at.emplace_back(Matrix3Xd::Zero(3, proxy.vertices()));
       clear.emplace_back(VectorXd::Zero(proxy.vertices()));
+      sharp.push_back({BoundsTree(boxes(obstacle->sharp_edges())), BoundsTree(boxes(obstacle->sharp_vertices()))});
     }
     memory = inner ? inner->memory() : no_impulses(no_rows);
     memory.contact = VectorXd::Zero(3 * map.control_points());
@@ -93,6 +127,7 @@ struct ContactProjection::Impl {
   void set_nodes(ContactRow& row) const;
   void warm(const ContactForces& kept);
   void look(int vertex, int obstacle, std::vector<ContactRow>& out);
+  void look_at_sharp(int obstacle);
   void search(const ContactForces& kept);
   void add_bulges();
   void take_up(ContactRow& row, const ContactForces& kept) const;
@@ -165,26 +200,27 @@ void ContactProjection::Impl::look(int vertex, int index, std::vector<ContactRow
     if (near) before = obstacle.carry(start, near->feature);
   }
   const double motion = (to - before).norm(), reach = motion + largest + margin + spare;
-  const std::optional<SurfacePoint> first = obstacle.nearest(before, reach);
+  const std::optional<Meeting> first = nearest(obstacle, before, reach, 0);
   seen.col(vertex) = before;
   free[vertex] = (first ? std::abs(first->distance) : reach) - largest - margin;
   if (!first || free[vertex] > motion) return;
+  const int side = first->side;
 
   const double offset = own + std::min(proxy.chord_error(vertex, at, first->normal), options.largest_chord);
-  std::optional<SurfacePoint> hit;
+  std::optional<Meeting> hit;
   if (first->distance > 0 && motion > std::max(offset, least_offset)) {
     // Moves along the path by what is surely free, so that nothing thin is passed. [Hart 1996]
     const double stop = 0.5 * offset;
     double s = 0, distance = first->distance;
-    std::optional<SurfacePoint> near = first;
+    std::optional<Meeting> near = first;
     while (near && distance > stop && s < 1) {
       s = std::min(1.0, s + (distance - 0.5 * stop) / motion);
-      near = obstacle.nearest(before + s * (to - before), reach);
+      near = nearest(obstacle, before + s * (to - before), reach, side);
       if (near) distance = near->distance;
     }
     if (near && distance <= stop) hit = near;
   }
-  if (!hit) hit = obstacle.nearest(to, reach + std::abs(first->distance));
+  if (!hit) hit = nearest(obstacle, to, reach + std::abs(first->distance), side);
   if (!hit) return;
 
   ContactRow row;
@@ -198,10 +234,114 @@ void ContactProjection::Impl::look(int vertex, int index, std::vector<ContactRow
   row.distance = first->distance;
   row.friction = friction(proxy.panel(vertex), index);
   row.feature = hit->feature;
+  row.side = side;
   row.anchor = before;
   row.obstacle_move = obstacle.carry(row.target, hit->feature) - row.target;
   set_nodes(row);
   if (row.weight > 0) out.push_back(std::move(row));
+}
+
+// Whether the way out from a sharp edge or vertex at `point` along `normal` is free: otherwise a face is met there.
+bool leads_out(const Obstacle& obstacle, const Vector3d& point, const Vector3d& normal, double step) {
+  const auto near = obstacle.nearest(point + step * normal, 2 * step);
+  return near && near->distance > 0.9 * step;
+}
+
+// Contacts of the cloth's edges and triangles with what is sharp of an obstacle, where the cloth was outside.
+void ContactProjection::Impl::look_at_sharp(int index) {
+  Obstacle& obstacle = *obstacles[static_cast<std::size_t>(index)];
+  const std::span<const Segment> edges = obstacle.sharp_edges();
+  const std::span<const Vector3d> vertices = obstacle.sharp_vertices();
+  if (edges.empty() && vertices.empty()) return;
+  Sharp& features = sharp[static_cast<std::size_t>(index)];
+  if (!obstacle.still()) {
+    features.edges.refit(boxes(edges));
+    features.vertices.refit(boxes(vertices));
+  }
+  const double own = obstacle.thickness() + options.largest_chord;
+  const Matrix3Xd& seen = looked_at[static_cast<std::size_t>(index)];
+  const VectorXd& free = clear[static_cast<std::size_t>(index)];
+  // The cloth within a distance of a vertex meets nothing.
+  const auto far = [&](int vertex, double distance) {
+    return obstacle.still() && free[vertex] > distance + (at.col(vertex) - seen.col(vertex)).norm() &&
+           free[vertex] > distance + (from.col(vertex) - seen.col(vertex)).norm();
+  };
+  const auto start_of = [&](int vertex) -> Vector3d {
+    if (obstacle.still()) return from.col(vertex);
+    const auto near = obstacle.nearest(at.col(vertex), HUGE_VAL);
+    return near ? obstacle.carry(from.col(vertex), near->feature) : Vector3d(from.col(vertex));
+  };
+  const auto add = [&](ContactRow row, const Vector3d& normal, const Vector3d& target, const Vector3d& start) {
+    row.normal = normal;
+    row.target = target;
+    const Vector3d now = [&] {
+      Vector3d y = Vector3d::Zero();
+      for (const auto& [vertex, share] : row.vertices) y += share * at.col(vertex);
+      return y;
+    }();
+    double cloth = 0, chord = 0;
+    for (const auto& [vertex, share] : row.vertices) {
+      cloth = std::max(cloth, proxy.half_thickness(vertex));
+      chord = std::max(chord, proxy.chord_error(vertex, at, normal));
+    }
+    row.chord = std::min(chord, options.largest_chord);
+    row.offset = cloth + obstacle.thickness() + row.chord;
+    if (normal.dot(now - target) - row.offset > std::max(row.offset, least_offset)) return;
+    const auto before = obstacle.nearest(start, HUGE_VAL);
+    if (!before || before->distance < 0 || !leads_out(obstacle, target, normal, std::max(row.offset, least_offset)))
+      return;
+    row.distance = row.offset;  // feature contacts hold what they have
+    row.anchor = start;
+    row.feature = before->feature;
+    row.obstacle_move = obstacle.carry(target, row.feature) - target;
+    row.friction = friction(proxy.panel(row.vertices[0].first), index);
+    set_nodes(row);
+    if (row.weight > 0) rows.push_back(std::move(row));
+  };
+
+  for (int e = 0; !edges.empty() && e < static_cast<int>(proxy.edges().size()); ++e) {
+    const auto [a, b] = proxy.edges()[static_cast<std::size_t>(e)];
+    const Vector3d along = at.col(b) - at.col(a);
+    if (far(a, along.norm())) continue;
+    const double reach = own + std::max(proxy.half_thickness(a), least_offset);
+    Box box(at.col(a));
+    box.extend(at.col(b)).extend(from.col(a)).extend(from.col(b));
+    features.edges.meeting(box, 2 * reach, [&, a = a, b = b](int k) {
+      const Segment& edge = edges[static_cast<std::size_t>(k)];
+      const Vector3d d = edge.to - edge.from;
+      const Vector3d normal = along.cross(d);
+      if (!(normal.norm() > parallel * along.norm() * d.norm())) return;
+      // Where the two lines are nearest.
+      const Vector3d between = at.col(a) - edge.from;
+      const double aa = along.squaredNorm(), dd = d.squaredNorm(), ad = along.dot(d), det = aa * dd - ad * ad;
+      const double s = (ad * d.dot(between) - dd * along.dot(between)) / det,
+                   u = (aa * d.dot(between) - ad * along.dot(between)) / det;
+      if (!(s > 0 && s < 1 && u >= 0 && u <= 1)) return;
+      const Vector3d target = edge.from + u * d;
+      const Vector3d start = (1 - s) * start_of(a) + s * start_of(b);
+      const Vector3d n = normal.normalized(), out = n.dot(start - target) < 0 ? Vector3d(-n) : n;
+      add({.key = {edge_to_edge, e, k, index}, .vertices = {{a, 1 - s}, {b, s}}}, out, target, start);
+    });
+  }
+  for (int t = 0; !vertices.empty() && t < static_cast<int>(proxy.triangles().size()); ++t) {
+    const auto [a, b, c] = proxy.triangles()[static_cast<std::size_t>(t)];
+    const Vector3d ab = at.col(b) - at.col(a), ac = at.col(c) - at.col(a);
+    if (far(a, std::max(ab.norm(), ac.norm()))) continue;
+    const double reach = own + std::max(proxy.half_thickness(a), least_offset);
+    Box box(at.col(a));
+    for (const int v : {a, b, c}) box.extend(at.col(v)).extend(from.col(v));
+    features.vertices.meeting(box, 2 * reach, [&, a = a, b = b, c = c](int k) {
+      const Vector3d& target = vertices[static_cast<std::size_t>(k)];
+      const Vector3d normal = ab.cross(ac), way = target - at.col(a);
+      const double area = normal.squaredNorm();
+      if (!(area > 0)) return;
+      const double v = normal.dot(way.cross(ac)) / area, w = normal.dot(ab.cross(way)) / area, u = 1 - v - w;
+      if (!(u >= 0 && v >= 0 && w >= 0)) return;
+      const Vector3d start = u * start_of(a) + v * start_of(b) + w * start_of(c);
+      const Vector3d n = normal.normalized(), out = n.dot(start - target) < 0 ? Vector3d(-n) : n;
+      add({.key = {face_to_vertex, t, k, index}, .vertices = {{a, u}, {b, v}, {c, w}}}, out, target, start);
+    });
+  }
 }
 
 void ContactProjection::Impl::search(const ContactForces& kept) {
@@ -217,6 +357,8 @@ void ContactProjection::Impl::search(const ContactForces& kept) {
   rows.clear();
   for (std::vector<ContactRow>& own : found)
     for (ContactRow& row : own) rows.push_back(std::move(row));
+  for (int k = 0; k < static_cast<int>(obstacles.size()); ++k) look_at_sharp(k);
+  std::ranges::sort(rows, {}, &ContactRow::key);
   add_bulges();
   for (ContactRow& row : rows) {
     const double gap = row.distance - row.offset;
@@ -235,8 +377,10 @@ void ContactProjection::Impl::add_bulges() {
     return row_at[static_cast<std::size_t>(obstacle) * static_cast<std::size_t>(proxy.vertices()) +
                   static_cast<std::size_t>(vertex)];
   };
-  for (std::size_t k = 0; k < rows.size(); ++k) slot(rows[k].key[1], rows[k].key[3]) = static_cast<int>(k);
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (rows[k].key[0] == vertex_to_face) slot(rows[k].key[1], rows[k].key[3]) = static_cast<int>(k);
   for (ContactRow& row : rows) {
+    if (row.key[0] != vertex_to_face) continue;
     double bulge = 0;
     for (const int other : proxy.neighbours(row.key[1])) {
       const int k = slot(other, row.key[3]);
@@ -268,17 +412,19 @@ void ContactProjection::Impl::take_up(ContactRow& row, const ContactForces& kept
   const auto k = static_cast<Eigen::Index>(low);
   const Vector3d force = dt * dt * kept.force.col(k);
   row.push = std::max(0.0, row.normal.dot(force));
-  row.drag = within(across(force, row.normal), row.friction * row.push);
-  row.anchor = obstacles[static_cast<std::size_t>(row.key[3])]->carry(kept.anchor.col(k), row.feature);
+  row.drag = shortened(across(force, row.normal), row.friction * row.push);
+  // Edges meet in another place of both in each step.
+  if (row.key[0] == vertex_to_face)
+    row.anchor = obstacles[static_cast<std::size_t>(row.key[3])]->carry(kept.anchor.col(k), row.feature);
 }
 
 // Normals where the contacts are now.
 void ContactProjection::Impl::refresh(const Nodes& x) {
   for (ContactRow& row : rows) {
-    if (row.push == 0) continue;
+    if (row.push == 0 || row.key[0] != vertex_to_face) continue;
     const Obstacle& obstacle = *obstacles[static_cast<std::size_t>(row.key[3])];
     const Vector3d y = sum_of(row.nodes, x) + row.constant;
-    const auto near = obstacle.nearest(y, 2 * row.offset + std::abs(row.bias));
+    const auto near = nearest(obstacle, y, 2 * row.offset + std::abs(row.bias), row.side);
     // Not where it went through something thin: there the plane that it met stays.
     if (!near || near->normal.dot(row.normal) < 0.7) continue;
     row.normal = near->normal;
@@ -301,7 +447,7 @@ double ContactProjection::Impl::sweep(Nodes x) {
     const double more = row.push - push_before;
     const Vector3d drag_before = row.drag;
     if (row.push > 0)
-      row.drag = within(row.drag - across(y - row.anchor, row.normal) / row.weight, row.friction * row.push);
+      row.drag = shortened(row.drag - across(y - row.anchor, row.normal) / row.weight, row.friction * row.push);
     else
       row.drag.setZero();
     const Vector3d change = more * row.normal + row.drag - drag_before;
@@ -329,7 +475,7 @@ void ContactProjection::Impl::set_impulses(const VectorXd& z) {
     ContactRow& row = rows[k];
     const Vector3d impulse = z.segment<3>(3 * static_cast<Eigen::Index>(k)) / std::sqrt(row.weight);
     row.push = std::max(0.0, row.normal.dot(impulse));
-    row.drag = within(across(impulse, row.normal), row.friction * row.push);
+    row.drag = shortened(across(impulse, row.normal), row.friction * row.push);
     push(row, row.push * row.normal + row.drag, pushed);
   }
 }
@@ -434,8 +580,8 @@ double ContactProjection::settle(Nodes v, double t) {
       // What is pushed out keeps nothing of that velocity.
       if (row.bias == 0 || apart > 2 * s.options.push_out) row.velocity_push = std::max(0.0, row.velocity_push);
       const Vector3d drag_before = row.velocity_drag;
-      row.velocity_drag = within(row.velocity_drag - across(u, row.normal) / row.weight,
-                                 row.friction * std::max(0.0, row.velocity_push));
+      row.velocity_drag = shortened(row.velocity_drag - across(u, row.normal) / row.weight,
+                                    row.friction * std::max(0.0, row.velocity_push));
       const Vector3d change = (row.velocity_push - push_before) * row.normal + row.velocity_drag - drag_before;
       s.push(row, change, v);
       largest = std::max(largest, change.norm() * row.weight);

@@ -13,10 +13,10 @@ namespace toile {
 // with y the point of the cloth (of self-contact: the vector between its two points, and target 0).
 struct ContactRow {
   std::array<int, 4> key{};  // kind, two features of cloth or obstacle, obstacle (-1: the cloth itself)
-  std::vector<std::pair<int, double>> nodes;
-  std::vector<std::pair<int, double>> vertices;  // of the proxy, by which the nodes are reached
-  Eigen::Vector3d constant{0, 0, 0};             // what fixed control points add
-  Eigen::Vector3d fixed_velocity{0, 0, 0};       // and to the velocity
+  std::vector<std::pair<int, double>> nodes = {};
+  std::vector<std::pair<int, double>> vertices = {};  // of the proxy, by which the nodes are reached
+  Eigen::Vector3d constant{0, 0, 0};                  // what fixed control points add
+  Eigen::Vector3d fixed_velocity{0, 0, 0};            // and to the velocity
   Eigen::Vector3d normal{0, 0, 1}, target{0, 0, 0}, anchor{0, 0, 0};
   Eigen::Vector3d obstacle_move{0, 0, 0};  // m, of the obstacle's material there in the step
   double offset = 0, friction = 0;
@@ -26,6 +26,7 @@ struct ContactRow {
   double weight = 0;      // sum value^2 / mass [1/kg]
   double compliance = 0;  // m per impulse [1/kg]
   int feature = 0;        // of the obstacle
+  int side = 1;           // -1: on the inner side of a surface with two
   // Impulses [kg m]: displacement of node k by them is value_k / mass_k times.
   double push = 0;
   Eigen::Vector3d drag{0, 0, 0};

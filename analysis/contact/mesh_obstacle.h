@@ -46,7 +46,7 @@ class MeshObstacle : public Obstacle {
   std::span<const Eigen::Vector3d> sharp_vertices() const override { return sharp_vertices_; }
 
   // Whether no edge has one face only.
-  bool closed() const { return closed_; }
+  bool closed() const override { return closed_; }
 
  private:
   // A place in the sequence of shapes: between number `shape` and the next, at a share of the way.

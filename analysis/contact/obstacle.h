@@ -43,6 +43,8 @@ class Obstacle {
 
   // Takes the shape of time `now`; carry() then leads from the shape of time `before` to it.
   virtual void move(double before, double now) = 0;
+  // Whether it has an inside, which nothing may enter; else it is a surface that is met from either side.
+  virtual bool closed() const { return true; }
   // Whether every time has the same shape.
   virtual bool still() const = 0;
   // Unset where the surface is farther than `reach` from p on either side. Calls may come from several threads.
