@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "analysis/contact/anderson.h"
 #include "analysis/contact/bounds_tree.h"
+#include "analysis/contact/self_search.h"
 #include "analysis/parallel/workers.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
@@ -19,13 +21,15 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Nodes = Eigen::Ref<VectorXd>;
 
-// Kinds of contact: of the cloth's vertices, edges and triangles with faces, sharp edges and vertices of an obstacle.
-enum Kind { vertex_to_face, edge_to_edge, face_to_vertex };
+// Kinds of contact: of the cloth's vertices, edges and triangles with faces, sharp edges and vertices of an obstacle,
+// of its vertices and edges with its own triangles and edges.
+enum Kind { vertex_to_face, edge_to_edge, face_to_vertex, vertex_to_cloth, edge_to_cloth };
 
 constexpr double stiffness = 100;            // a contact yields by 1 / this of its offset under its own weight
 constexpr double deep = 0.1;                 // of the offset: a start nearer than this is moved off slowly
 constexpr double normal_tolerance = 0.02;    // of the offset
 constexpr double tangent_tolerance = 0.002;  // of acceleration dt^2, and of acceleration dt for velocities
+constexpr double slip = 5;                   // times that an anchor is left behind
 constexpr double inner_tolerance = 0.1;      // of these, within a round
 constexpr double least_offset = 1e-5;        // m, that displacements are compared with
 constexpr double parallel = 0.05;            // sine of the angle below which edges meet nowhere in particular
@@ -97,6 +101,7 @@ struct ContactProjection::Impl {
     BoundsTree edges, vertices;
   };
   std::vector<Sharp> sharp;
+  std::optional<SelfSearch> self;
   ProjectionMemory memory;
   Counts counts;
 
@@ -109,6 +114,11 @@ struct ContactProjection::Impl {
       looked_at.emplace_back(Matrix3Xd::Zero(3, proxy.vertices()));
       clear.emplace_back(VectorXd::Zero(proxy.vertices()));
       sharp.push_back({BoundsTree(boxes(obstacle->sharp_edges())), BoundsTree(boxes(obstacle->sharp_vertices()))});
+    }
+    if (options.self) {
+      Matrix3Xd rest(3, proxy.vertices());
+      for (int v = 0; v < proxy.vertices(); ++v) rest.col(v) = apply(proxy.points(v), body.rest());
+      self.emplace(proxy, std::move(rest), options.largest_chord);
     }
     memory = inner ? inner->memory() : no_impulses(no_rows);
     memory.contact = VectorXd::Zero(3 * map.control_points());
@@ -128,6 +138,7 @@ struct ContactProjection::Impl {
   void warm(const ContactForces& kept);
   void look(int vertex, int obstacle, std::vector<ContactRow>& out);
   void look_at_sharp(int obstacle);
+  void look_at_cloth();
   void search(const ContactForces& kept);
   void add_bulges();
   void take_up(ContactRow& row, const ContactForces& kept) const;
@@ -344,6 +355,26 @@ void ContactProjection::Impl::look_at_sharp(int index) {
   }
 }
 
+void ContactProjection::Impl::look_at_cloth() {
+  double margin = least_offset;
+  for (int v = 0; v < proxy.vertices(); ++v) margin = std::max(margin, 2 * proxy.half_thickness(v));
+  for (SelfMeeting& meeting : self->find(from, at, margin)) {
+    ContactRow row;
+    row.key = {meeting.edges ? edge_to_cloth : vertex_to_cloth, meeting.first, meeting.second, -1};
+    row.vertices = std::move(meeting.vertices);
+    row.normal = meeting.normal;
+    row.offset = meeting.offset;
+    row.chord = meeting.chord;
+    row.distance = meeting.distance;
+    for (const auto& [vertex, share] : row.vertices) {
+      row.anchor += share * from.col(vertex);
+      row.friction += 0.25 * proxy.friction(vertex);
+    }
+    set_nodes(row);
+    if (row.weight > 0) rows.push_back(std::move(row));
+  }
+}
+
 void ContactProjection::Impl::search(const ContactForces& kept) {
   const Clock::time_point start = Clock::now();
   const int count = proxy.vertices();
@@ -358,6 +389,7 @@ void ContactProjection::Impl::search(const ContactForces& kept) {
   for (std::vector<ContactRow>& own : found)
     for (ContactRow& row : own) rows.push_back(std::move(row));
   for (int k = 0; k < static_cast<int>(obstacles.size()); ++k) look_at_sharp(k);
+  if (self) look_at_cloth();
   std::ranges::sort(rows, {}, &ContactRow::key);
   add_bulges();
   for (ContactRow& row : rows) {
@@ -437,7 +469,7 @@ void ContactProjection::Impl::refresh(const Nodes& x) {
 // One pass over all contacts; the largest change over what is allowed.
 double ContactProjection::Impl::sweep(Nodes x) {
   ++counts.sweeps;
-  const double slip = tangent_tolerance * options.acceleration * dt * dt;
+  const double least_slip = tangent_tolerance * options.acceleration * dt * dt;
   double largest = 0;
   for (ContactRow& row : rows) {
     const Vector3d y = sum_of(row.nodes, x) + row.constant;
@@ -455,7 +487,7 @@ double ContactProjection::Impl::sweep(Nodes x) {
     push(row, change, x);
     push(row, change, pushed);
     largest = std::max({largest, std::abs(more) * row.weight / (normal_tolerance * touch(row)),
-                        (row.drag - drag_before).norm() * row.weight / slip});
+                        (row.drag - drag_before).norm() * row.weight / least_slip});
   }
   return largest;
 }
@@ -491,8 +523,11 @@ ContactForces ContactProjection::Impl::keep(const Nodes& x) const {
     if (!at_work(row)) continue;
     out.key.insert(out.key.end(), row.key.begin(), row.key.end());
     out.force.col(k) = (row.push * row.normal + row.drag) / (dt * dt);
-    const bool slides = row.drag.norm() >= row.friction * row.push * (1 - 1e-9);
-    out.anchor.col(k++) = slides ? Vector3d(sum_of(row.nodes, x) + row.constant) : row.anchor;
+    const Vector3d y = sum_of(row.nodes, x) + row.constant;
+    const bool slides =
+        row.drag.norm() >= row.friction * row.push * (1 - 1e-9) &&
+        across(y - row.anchor, row.normal).norm() > slip * tangent_tolerance * options.acceleration * dt * dt;
+    out.anchor.col(k++) = slides ? y : row.anchor;
   }
   return out;
 }
@@ -551,7 +586,7 @@ ProjectionReport ContactProjection::step(Nodes x, Nodes v, double t, const Eigen
     for (int k = 0; k < most_sweeps && !settled; ++k)
       if (s.sweep(x) <= inner_tolerance) break;
     s.counts.sweep_seconds += since(sweeping);
-    if (s.rows.empty() || (!s.inner && round > 0)) settled = true;
+    if (s.rows.empty() || (round > 0 && !s.inner) || (s.inner && !s.inner->follows())) settled = true;
     if (!settled) s.set_impulses(faster.next(z, s.impulses()));
   }
   v += (s.pushed - s.held) / dt;

@@ -20,6 +20,7 @@ struct ContactOptions {
   double push_out = 0.2;        // m/s, at which cloth that starts nearer than its offset is moved off, without velocity
   double largest_chord = 1e-3;  // m, of the chord error that is added to the offset
   int max_rounds = 30;          // of contact and the other constraints in turn
+  bool self = false;            // the cloth meets itself
   Eigen::MatrixXd friction;     // panels x obstacles; empty: the obstacles' own
 };
 

@@ -29,6 +29,7 @@ ContactProxy::ContactProxy(const Body& body, const AffineMap& map, const Eigen::
       points_.push_back(body.place(static_cast<int>(p), uv.x(), uv.y()));
       places.place.push_back({points_.back(), 0, {}});
     }
+    cells_.insert(cells_.end(), panels[p].mesh.cell.begin(), panels[p].mesh.cell.end());
     for (const auto& t : panels[p].mesh.triangles) triangles_.push_back({t[0] + first, t[1] + first, t[2] + first});
   }
   rows_ = compose(map, places);

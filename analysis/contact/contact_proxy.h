@@ -32,6 +32,7 @@ class ContactProxy {
 
   int vertices() const { return static_cast<int>(panel_.size()); }
   const std::vector<std::array<int, 3>>& triangles() const { return triangles_; }
+  const std::vector<int>& cells() const { return cells_; }                 // knot cell of each triangle, on its panel
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }  // ascending
   int panel(int vertex) const { return panel_[static_cast<std::size_t>(vertex)]; }
   const Eigen::Vector2d& uv(int vertex) const { return uv_[static_cast<std::size_t>(vertex)]; }
@@ -50,6 +51,7 @@ class ContactProxy {
 
  private:
   std::vector<std::array<int, 3>> triangles_;
+  std::vector<int> cells_;
   std::vector<std::array<int, 2>> edges_;
   std::vector<std::array<int, 2>> opposite_;              // per edge the vertices across, -1 at a border
   std::vector<int> edges_start_, edges_at_, neighbours_;  // per vertex

@@ -100,6 +100,9 @@ class ConstraintSolver {
                                  const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) {
     return step(x, v, t, start, dt, forces);
   }
+  // Whether x follows a change of the candidate by a part of it, so that contact may find its balance by asking again;
+  // else contact comes once a step, after the others.
+  virtual bool follows() const { return true; }
   // Whether v then has all of the constraints' impulse, so that cloth at rest has v = 0; else it has what moves the
   // candidate, over dt: half of it.
   virtual bool end_velocity() const { return false; }

@@ -56,6 +56,7 @@ class Substeps final : public ConstraintSolver {
   ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
                         const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) override;
   bool end_velocity() const override { return true; }
+  bool follows() const override { return false; }  // a kick may come back within the step
   // From 0.6 on the two clocks may add 1 % of energy where cloth snaps taut again and again.
   double step_share() const override { return 0.5; }
   ProjectionReport measure(const Eigen::Ref<const Eigen::VectorXd>& x, double t) override;

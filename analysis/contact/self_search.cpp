@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "analysis/contact/self_search.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+namespace toile {
+namespace {
+
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+
+constexpr double parallel = 0.05;  // sine of the angle below which edges meet nowhere in particular
+constexpr double beyond = 0.05;    // of an edge or triangle: so far outside of it something may pass through it
+
+// Weights of the corners of a triangle at the place that p is over; unset for a triangle without area.
+std::optional<Vector3d> weights(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& p) {
+  const Vector3d ab = b - a, ac = c - a, normal = ab.cross(ac);
+  const double area = normal.squaredNorm();
+  if (!(area > 0)) return std::nullopt;
+  const double v = normal.dot((p - a).cross(ac)) / area, w = normal.dot(ab.cross(p - a)) / area;
+  return Vector3d(1 - v - w, v, w);
+}
+
+// Shares of two edges at which their lines are nearest; unset where they are all but parallel.
+std::optional<std::array<double, 2>> nearest(const Vector3d& a, const Vector3d& along, const Vector3d& b,
+                                             const Vector3d& other) {
+  const double aa = along.squaredNorm(), bb = other.squaredNorm(), ab = along.dot(other), det = aa * bb - ab * ab;
+  if (!(det > parallel * parallel * aa * bb)) return std::nullopt;
+  const Vector3d between = a - b;
+  return std::array{(ab * other.dot(between) - bb * along.dot(between)) / det,
+                    (aa * other.dot(between) - ab * along.dot(between)) / det};
+}
+
+bool inside(double share, double slack) {
+  return share >= -slack && share <= 1 + slack;
+}
+
+}  // namespace
+
+SelfSearch::SelfSearch(const ContactProxy& proxy, Matrix3Xd rest, double largest_chord)
+    : proxy_(proxy), rest_(std::move(rest)), largest_chord_(largest_chord) {
+  std::map<std::pair<int, int>, int> number;  // of panel and knot cell
+  std::vector<int> cell_of_vertex(static_cast<std::size_t>(proxy.vertices()), -1);
+  std::vector<std::vector<int>> around(static_cast<std::size_t>(proxy.vertices()));  // cells
+  for (std::size_t t = 0; t < proxy.triangles().size(); ++t) {
+    const auto& triangle = proxy.triangles()[t];
+    const auto [at, added] =
+        number.try_emplace({proxy.panel(triangle[0]), proxy.cells()[t]}, static_cast<int>(cells_.size()));
+    if (added) cells_.emplace_back();
+    const int cell = at->second;
+    cells_[static_cast<std::size_t>(cell)].triangles.push_back(static_cast<int>(t));
+    for (const int v : triangle) {
+      std::vector<int>& there = around[static_cast<std::size_t>(v)];
+      if (std::ranges::find(there, cell) == there.end()) there.push_back(cell);
+      int& own = cell_of_vertex[static_cast<std::size_t>(v)];
+      if (own >= 0) continue;
+      own = cell;
+      cells_[static_cast<std::size_t>(cell)].vertices.push_back(v);
+    }
+    thickest_ = std::max(thickest_, proxy.half_thickness(triangle[0]));
+  }
+  for (std::size_t e = 0; e < proxy.edges().size(); ++e) {
+    const auto& [a, b] = proxy.edges()[e];
+    for (const int cell : around[static_cast<std::size_t>(a)])
+      if (std::ranges::find(around[static_cast<std::size_t>(b)], cell) != around[static_cast<std::size_t>(b)].end()) {
+        cells_[static_cast<std::size_t>(cell)].edges.push_back(static_cast<int>(e));
+        break;
+      }
+  }
+  beside_.resize(cells_.size());
+  for (const std::vector<int>& there : around)
+    for (const int a : there)
+      beside_[static_cast<std::size_t>(a)].insert(beside_[static_cast<std::size_t>(a)].end(), there.begin(),
+                                                  there.end());
+  for (std::vector<int>& list : beside_) {
+    std::ranges::sort(list);
+    list.erase(std::ranges::unique(list).begin(), list.end());
+  }
+  boxes_.resize(cells_.size());
+  cones_.resize(cells_.size());
+  triangle_boxes_.resize(proxy.triangles().size());
+  edge_boxes_.resize(proxy.edges().size());
+}
+
+// Boxes of where the cells' vertices go, and how much their triangles turn.
+void SelfSearch::set_cells(const Moved& m) {
+  const auto around = [&](std::span<const int> vertices) {
+    Box box;
+    for (const int v : vertices) box.extend(m.from.col(v)).extend(m.at.col(v));
+    return box;
+  };
+  for (std::size_t t = 0; t < triangle_boxes_.size(); ++t) triangle_boxes_[t] = around(proxy_.triangles()[t]);
+  for (std::size_t e = 0; e < edge_boxes_.size(); ++e) edge_boxes_[e] = around(proxy_.edges()[e]);
+  std::vector<Vector3d> normals;
+  for (std::size_t c = 0; c < cells_.size(); ++c) {
+    boxes_[c].setEmpty();
+    normals.clear();
+    Vector3d mean = Vector3d::Zero();
+    for (const int t : cells_[c].triangles) {
+      boxes_[c].extend(triangle_boxes_[static_cast<std::size_t>(t)]);
+      const auto& [i, j, k] = proxy_.triangles()[static_cast<std::size_t>(t)];
+      for (const Matrix3Xd* places : {&m.from, &m.at}) {
+        const Vector3d normal = (places->col(j) - places->col(i)).cross(places->col(k) - places->col(i));
+        normals.push_back(normal.normalized());
+        mean += normals.back();
+      }
+    }
+    Cone& cone = cones_[c];
+    cone.axis = mean.normalized();
+    cone.cosine = 1;
+    for (const Vector3d& normal : normals) cone.cosine = std::min(cone.cosine, normal.dot(cone.axis));
+  }
+}
+
+// Whether all triangles of two cells face within a right angle of each other.
+bool SelfSearch::flat(int a, int b) const {
+  const Cone &one = cones_[static_cast<std::size_t>(a)], &other = cones_[static_cast<std::size_t>(b)];
+  const auto angle = [](double cosine) { return std::acos(std::clamp(cosine, -1.0, 1.0)); };
+  return angle(one.cosine) + angle(other.cosine) + angle(one.axis.dot(other.axis)) < std::acos(0.0);
+}
+
+bool SelfSearch::neighbours(int a, int b) const {
+  return std::ranges::binary_search(beside_[static_cast<std::size_t>(a)], b);
+}
+
+std::vector<SelfMeeting> SelfSearch::find(const Matrix3Xd& from, const Matrix3Xd& at, double margin) {
+  const Moved moved{from, at, margin};
+  set_cells(moved);
+  if (tree_.size() == 0)
+    tree_ = BoundsTree(boxes_);
+  else
+    tree_.refit(boxes_);
+  std::vector<SelfMeeting> out;
+  const auto look = [&](int a, int b) {
+    if (neighbours(a, b) && flat(a, b)) return;
+    vertices_to_triangles(moved, a, b, out);
+    if (a != b) vertices_to_triangles(moved, b, a, out);
+    edges_to_edges(moved, a, b, out);
+  };
+  const double reach = 2 * (thickest_ + largest_chord_) + margin;
+  for (int c = 0; c < static_cast<int>(cells_.size()); ++c) look(c, c);
+  tree_.own_pairs(reach, look);
+  std::ranges::sort(out, {}, [](const SelfMeeting& m) { return std::array{int(m.edges), m.first, m.second}; });
+  return out;
+}
+
+void SelfSearch::vertices_to_triangles(const Moved& m, int a, int b, std::vector<SelfMeeting>& out) const {
+  const double reach = 2 * (thickest_ + largest_chord_) + m.margin;
+  for (const int v : cells_[static_cast<std::size_t>(a)].vertices) {
+    Box way(m.at.col(v));
+    way.extend(m.from.col(v));
+    if (!within(way, boxes_[static_cast<std::size_t>(b)], reach)) continue;
+    for (const int t : cells_[static_cast<std::size_t>(b)].triangles) {
+      if (!within(way, triangle_boxes_[static_cast<std::size_t>(t)], reach)) continue;
+      const auto& [i, j, k] = proxy_.triangles()[static_cast<std::size_t>(t)];
+      if (v == i || v == j || v == k) continue;
+      const auto height = [&](const Matrix3Xd& x) {
+        const Vector3d normal = (x.col(j) - x.col(i)).cross(x.col(k) - x.col(i)).normalized();
+        return normal.dot(x.col(v) - x.col(i));
+      };
+      const double before = height(m.from), after = height(m.at);
+      const double side = before < 0 ? -1 : 1;
+      double sign = side;
+      if (before * after < 0) {
+        // Through the triangle, or past it?
+        const double s = before / (before - after);
+        const auto there = [&](int n) -> Vector3d { return (1 - s) * m.from.col(n) + s * m.at.col(n); };
+        const auto w = weights(there(i), there(j), there(k), there(v));
+        if (!w || w->minCoeff() < -beyond) sign = -side;
+      }
+      const auto w = weights(m.at.col(i), m.at.col(j), m.at.col(k), m.at.col(v));
+      if (!w || w->minCoeff() < (sign == side ? -beyond : 0.0)) continue;
+      if (sign == side && before * after >= 0 && w->minCoeff() < 0) continue;
+      SelfMeeting meeting;
+      meeting.first = v;
+      meeting.second = t;
+      meeting.vertices = {{v, 1.0}, {i, -(*w)[0]}, {j, -(*w)[1]}, {k, -(*w)[2]}};
+      meeting.normal = sign * (m.at.col(j) - m.at.col(i)).cross(m.at.col(k) - m.at.col(i)).normalized();
+      add(m, std::move(meeting), out);
+    }
+  }
+}
+
+void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMeeting>& out) const {
+  const double reach = 2 * (thickest_ + largest_chord_) + m.margin;
+  for (const int e : cells_[static_cast<std::size_t>(a)].edges) {
+    const Box& box = edge_boxes_[static_cast<std::size_t>(e)];
+    if (!within(box, boxes_[static_cast<std::size_t>(b)], reach)) continue;
+    const auto [p, q] = proxy_.edges()[static_cast<std::size_t>(e)];
+    for (const int f : cells_[static_cast<std::size_t>(b)].edges) {
+      if ((a == b && f <= e) || !within(box, edge_boxes_[static_cast<std::size_t>(f)], reach)) continue;
+      const auto [r, s] = proxy_.edges()[static_cast<std::size_t>(f)];
+      if (p == r || p == s || q == r || q == s) continue;
+      const Vector3d along = m.at.col(q) - m.at.col(p), other = m.at.col(s) - m.at.col(r);
+      const auto shares = nearest(m.at.col(p), along, m.at.col(r), other);
+      if (!shares) continue;
+      const auto [u, v] = *shares;
+      const auto apart = [&, p = p, q = q, r = r, s = s](const Matrix3Xd& x) -> Vector3d {
+        return (1 - u) * x.col(p) + u * x.col(q) - (1 - v) * x.col(r) - v * x.col(s);
+      };
+      Vector3d normal = along.cross(other).normalized();
+      const double before = normal.dot(apart(m.from)), after = normal.dot(apart(m.at));
+      if (before < 0) normal = -normal;
+      double slack = 0;
+      if (before * after < 0) {
+        const double part = before / (before - after);
+        const auto there = [&](int n) -> Vector3d { return (1 - part) * m.from.col(n) + part * m.at.col(n); };
+        const auto then = nearest(there(p), there(q) - there(p), there(r), there(s) - there(r));
+        if (then && inside((*then)[0], beyond) && inside((*then)[1], beyond))
+          slack = beyond;
+        else
+          normal = -normal;
+      }
+      if (!inside(u, slack) || !inside(v, slack)) continue;
+      SelfMeeting meeting;
+      meeting.edges = true;
+      meeting.first = e;
+      meeting.second = f;
+      meeting.vertices = {{p, 1 - u}, {q, u}, {r, v - 1}, {s, -v}};
+      meeting.normal = normal;
+      add(m, std::move(meeting), out);
+    }
+  }
+}
+
+// With its offset, if that may be touched.
+void SelfSearch::add(const Moved& m, SelfMeeting meeting, std::vector<SelfMeeting>& out) const {
+  Vector3d now = Vector3d::Zero(), before = now, rest = now;
+  double first = 0, second = 0, first_chord = 0, second_chord = 0;
+  for (const auto& [vertex, share] : meeting.vertices) {
+    now += share * m.at.col(vertex);
+    before += share * m.from.col(vertex);
+    rest += share * rest_.col(vertex);
+    double& half = share > 0 ? first : second;
+    half = std::max(half, proxy_.half_thickness(vertex));
+  }
+  const double gap = meeting.normal.dot(now), thickness = first + second;
+  if (gap > thickness + 2 * largest_chord_ + m.margin) return;
+  for (const auto& [vertex, share] : meeting.vertices) {
+    double& chord = share > 0 ? first_chord : second_chord;
+    chord = std::max(chord, proxy_.chord_error(vertex, m.at, share > 0 ? meeting.normal : Vector3d(-meeting.normal)));
+  }
+  meeting.chord = std::min(first_chord, largest_chord_) + std::min(second_chord, largest_chord_);
+  meeting.offset = thickness + meeting.chord;
+  meeting.distance = meeting.normal.dot(before);
+  if (gap > meeting.offset + m.margin || rest.norm() < meeting.offset + m.margin) return;
+  out.push_back(std::move(meeting));
+}
+
+}  // namespace toile
