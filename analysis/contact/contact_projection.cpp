@@ -34,7 +34,8 @@ constexpr double inner_tolerance = 0.1;      // of these, within a round
 constexpr double least_offset = 1e-5;        // m, that displacements are compared with
 constexpr double parallel = 0.05;            // sine of the angle below which edges meet nowhere in particular
 constexpr double spare = 0.02;               // m, that a vertex may move before it is looked at again, at least
-constexpr int most_sweeps = 200, refreshed_rounds = 2, depth = 4;
+constexpr int most_advances = 500;           // along a path
+constexpr int most_sweeps = 10, last_sweeps = 100, refreshed_rounds = 2, depth = 4;
 
 Vector3d sum_of(const std::vector<std::pair<int, double>>& row, const Nodes& x) {
   Vector3d y = Vector3d::Zero();
@@ -224,12 +225,12 @@ void ContactProjection::Impl::look(int vertex, int index, std::vector<ContactRow
     const double stop = 0.5 * offset;
     double s = 0, distance = first->distance;
     std::optional<Meeting> near = first;
-    while (near && distance > stop && s < 1) {
+    for (int k = 0; near && distance > stop && s < 1 && k < most_advances; ++k) {
       s = std::min(1.0, s + (distance - 0.5 * stop) / motion);
       near = nearest(obstacle, before + s * (to - before), reach, side);
       if (near) distance = near->distance;
     }
-    if (near && distance <= stop) hit = near;
+    if (near && (distance <= stop || s < 1)) hit = near;  // where it got to, at the worst
   }
   if (!hit) hit = nearest(obstacle, to, reach + std::abs(first->distance), side);
   if (!hit) return;
@@ -583,10 +584,11 @@ ProjectionReport ContactProjection::step(Nodes x, Nodes v, double t, const Eigen
       fprintf(stderr, "t %.4f round %d first %.3g iterations %d conv %d strain %.3g rows %zu\n", t, round, first,
               report.iterations, report.converged, report.strain_violation, s.rows.size());
     settled = first <= 1;
-    for (int k = 0; k < most_sweeps && !settled; ++k)
+    const bool once = s.inner && !s.inner->follows();
+    for (int k = 0; k < (once ? last_sweeps : most_sweeps) && !settled; ++k)
       if (s.sweep(x) <= inner_tolerance) break;
     s.counts.sweep_seconds += since(sweeping);
-    if (s.rows.empty() || (round > 0 && !s.inner) || (s.inner && !s.inner->follows())) settled = true;
+    if (s.rows.empty() || once) settled = true;
     if (!settled) s.set_impulses(faster.next(z, s.impulses()));
   }
   v += (s.pushed - s.held) / dt;
@@ -605,7 +607,7 @@ double ContactProjection::settle(Nodes v, double t) {
   Impl& s = *impl_;
   double work = s.inner ? s.inner->settle(v, t) : 0;
   const double tolerance = tangent_tolerance * s.options.acceleration * s.dt;
-  for (int k = 0; k < most_sweeps; ++k) {
+  for (int k = 0; k < last_sweeps; ++k) {
     double largest = 0;
     for (ContactRow& row : s.rows) {
       if (row.push == 0) continue;
