@@ -76,9 +76,9 @@ TEST(CellTriangles, CoverADiscBetterAndBetter) {
 }
 
 TEST(CellTriangles, HolesStayHoles) {
-  TrimmedSurface surface = trimmed(unit_cells(4), {polygon_loop({{0, 0}, {4, 0}, {4, 4}, {0, 4}}),
-                                                   polygon_loop({{1.25, 1.25}, {1.25, 2.5}, {2.5, 2.5}, {2.5, 1.25}},
-                                                                LoopKind::hole)});
+  TrimmedSurface surface =
+      trimmed(unit_cells(4), {polygon_loop({{0, 0}, {4, 0}, {4, 4}, {0, 4}}),
+                              polygon_loop({{1.25, 1.25}, {1.25, 2.5}, {2.5, 2.5}, {2.5, 1.25}}, LoopKind::hole)});
   validate_loops(surface);
   EXPECT_NEAR(expect_cells(surface, trace_trims(surface), {4, 4}), 16 - 1.25 * 1.25, 1e-12);
 }
