@@ -180,7 +180,7 @@ class Closer {
           if (out == 0) continue;
           if (out > reach(place, a)) {
             if (loop.kind == LoopKind::hole) continue;  // cut off where it crosses the outer loop, or refused there
-            fail(loop, &c, "the trim leaves the domain by " + text(out) + ", may by " + text(reach(place, a)), place);
+            fail(loop, &c, "the trim leaves the domain by " + text(out) + ", limit " + text(reach(place, a)), place);
           }
           const double moved = pull_in(c, axis, beyond_max, out, place);
           if (moved == 0) fail(loop, &c, "the trim leaves the domain by " + text(out), place);

@@ -12,7 +12,7 @@ void merge_near_points(const NurbsSurface& surface, std::vector<ConstraintPoint>
 
 // Marks constraint points that the projection can't take: `points[panel][k].used = false`, `why` = "fixed" (touches
 // only fixed control points) or "merged", and returns the strain rows of the others in the order of the points, then
-// those of `means` (averaged_rows()) that can move. Place rows are kept all; a SolverError names two that contradict
+// those of `means` (averaged_rows()) that can move. All place rows are kept; a SolverError names two that contradict
 // each other. Rows that depend on each other are taken all the same: with a stiffness they share their load
 // (analysis/constraint/README.md, "Which rows").
 std::vector<StrainRow> select_rows(const Body& body, const AffineMap& map,

@@ -19,8 +19,8 @@ struct ThreadStress {
 // Eq. 37 as it stands, per strain row: the fabric's stress at the row's place plus lambda / area. `row_force`: size of
 // each row's force [N m], above 0 where it pulls: the strain impulses of a step of FastProjection over dt^2, which are
 // lambda times the stretch along which they acted. A multiplier is the stress times the quadrature weight that
-// equilibrium gives the row (2/3 and 4/3 of a cell in turns at p = 2): over an area that is no such weight it has
-// stripes. weigh_rows() makes it one as far as weights can be.
+// equilibrium gives the row (alternately 2/3 and 4/3 of a cell at p = 2): divided by an area that is no such weight it
+// shows stripes. weigh_rows() makes the areas such weights as far as that is possible.
 std::vector<ThreadStress> row_stress(const Body& body, const ConstraintRows& rows,
                                      const Eigen::Ref<const Eigen::VectorXd>& row_force,
                                      const Eigen::Ref<const Eigen::VectorXd>& q);

@@ -18,7 +18,7 @@ struct SparsePattern {
   int size() const { return static_cast<int>(column_start.size()) - 1; }
 };
 
-// Whose numbers a factor has. CHOLMOD is the oracle of ours: the tests hold one against the other, and the build option
+// Whose numbers a factor has. CHOLMOD is the reference for ours: the tests compare the two, and the build option
 // TOILE_CHOLMOD_SOLVES makes it the default, to tell a fault of the factor from one of the matrix.
 enum class CholeskyNumbers { ours, cholmod };
 CholeskyNumbers default_numbers();

@@ -12,7 +12,7 @@
 namespace toile {
 
 // x: free nodes (xyz interleaved, 3 n_x numbers), q: control points (3 n_q). T acts on nodes, alike in x, y and z.
-//   (1) rows of T sum to 1 for control points that no pin moves, together with their fixed part to 1 otherwise;
+//   (1) rows of T sum to 1 for control points that no pin moves; for the others, together with their fixed part;
 //   (2) fixed control points follow g(t).
 class AffineMap {
  public:

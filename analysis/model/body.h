@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What of a scene's cloth every model has: panels, coordinates, masses, and how a place of the material depends on the
-// coordinates. Constraint rows, pins, stress recovery and contact know a Body, never a model.
+// What every model has of a scene's cloth: panels, coordinates, masses, and how the position of a material point
+// depends on the coordinates. Constraint rows, pins, stress recovery and contact know a Body, never a model.
 //
 // Coordinates: positions of points [m], panel by panel, xyz interleaved (3 n numbers). The points of a shell are the
 // control points of its panels, u fastest.

@@ -31,7 +31,7 @@ struct Elastic {
 
 // q: positions of all coordinates [m], xyz interleaved.
 //   (1) forces are -dE/dq, and changes of force -K dq with K the derivative of dE/dq (TangentKind::exact);
-//   (2) a rigid motion of q leaves the energy;
+//   (2) a rigid motion of q leaves the energy unchanged;
 //   (3) results don't depend on the number of threads; with threads a potential serves one caller at a time.
 class Potential {
  public:

@@ -32,7 +32,7 @@ class LimitLaw {
     const double s = 1 + compliance_ * std::abs(lambda) / width(lambda);
     return compliance_ / (s * s);
   }
-  // 1 over what is left to the limit: by which part of itself the force changes for a strain, near the wall.
+  // 1 / (distance to the limit): the relative change of the force per strain, near the wall.
   double steepness(double lambda) const { return (1 + compliance_ * std::abs(lambda) / width(lambda)) / width(lambda); }
   // The multiplier that belongs to a strain: 0 within the slack. From `last` of the width on it goes on straight, so
   // that it is finite beyond the limit too.

@@ -36,14 +36,14 @@ class SmoothEnergy {
 // Rows must have a stiffness. The cloth's own forces act by velocity Verlet, the rows' by the trapezoidal rule: with
 // the accelerations a0 at the start and the candidate x~ = x0 + dt v0 + dt^2/2 a0
 //
-//   M (x1 - x~) = -dt^2/4 (J0^T lambda0 + J1^T phi1),   phi1 = lambda1 + friction (C1 - C0),   v = 2 (x1 - x0) / dt -
-//   v0,
+//   M (x1 - x~) = -dt^2/4 (J0^T lambda0 + J1^T phi1),   phi1 = lambda1 + friction (C1 - C0),
+//   v = 2 (x1 - x0) / dt - v0,
 //
-// which is stable whatever the rows' stiffness wherever Verlet is, without resonance. x1 is the least of inertia and
-// the limit's energy. Of a vibration omega of the rows the step resolves 1 - r, r = (s / (1 + s))^3, s = (omega
-// dt/2)^2; the rest is taken out, of strains by a friction of r times the law's slope at the start, of velocities by
-// settle(), which applies (I - (I + dt^2/4 M^-1 K)^-1)^3. At omega dt = 1/2 that is 1e-4 of an amplitude, at 1 0.5 %,
-// in a step. Place rows are held exactly.
+// which is stable wherever Verlet is, whatever the rows' stiffness, without resonance. x1 minimises inertia plus the
+// limit's energy. The step resolves the share 1 - r of a vibration of the rows at omega, r = (s / (1 + s))^3,
+// s = (omega dt/2)^2. The rest is removed: from strains by a friction of r times the law's slope at the start, from
+// velocities by settle(), which applies (I - (I + dt^2/4 M^-1 K)^-1)^3. Per step that is 1e-4 of an amplitude at
+// omega dt = 1/2, 0.5 % at 1. Place rows are held exactly.
 //   (1) every strain stays below its limit;
 //   (2) nothing but places, velocities and forces at the start is remembered, so the next step may have any size;
 //   (3) momentum is kept where nothing is pinned, spin but for errors of the step.

@@ -36,8 +36,8 @@ struct KernelPoint {
 class RowKernel {
  public:
   virtual ~RowKernel() = default;
-  // The kernel's places, velocities and accelerations by the rest, of a node and of a fixed control point, whose v and
-  // a must stay 0; x null: not in this kernel.
+  // Where the kernel keeps the position, velocity and acceleration by all other forces, of a node and of a fixed
+  // control point, whose v and a must stay 0. x null: not in this kernel.
   virtual KernelPoint node(int k) = 0;
   virtual KernelPoint fixed(int k) = 0;
   virtual void set_stiffness(const Eigen::VectorXd& per_row) = 0;  // N m, of all strain rows

@@ -49,7 +49,7 @@ class RowMatrix {
   // preconditioner's norm is `tolerance` of the right side's; false where that takes more than `most` iterations. What
   // is left has no sum where rows feel no translation, so that momentum is kept exactly.
   bool conjugate_gradients(const Eigen::VectorXd& rhs, Eigen::VectorXd& x, double tolerance, int most);
-  // How much the rows stiffen an average node: trace of sum d^2 B over scale m. What conjugate gradients are slow for.
+  // How much the rows stiffen an average node: trace of sum d^2 B over scale m. Conjugate gradients slow down with it.
   double stiffening() const;
 
   void use_threads(Workers* workers);

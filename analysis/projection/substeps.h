@@ -32,8 +32,9 @@ struct SubstepsOptions {
 
 // Rows must have a stiffness. A step of dt = n h from x0, v0 under the acceleration a of its start:
 //
-//   v += dt/2 a;   n times  v -= h M^-1 J^T lambda (half of it before the first and after the last), x += h v;   v +=
-//   dt/2 a lambda = k (e + damping h / h_max (e - e of the substep before)),   e = C beyond the slack
+//   v += dt/2 a;   n times  v -= h M^-1 J^T lambda (half of it before the first and after the last), x += h v;
+//   v += dt/2 a;
+//   lambda = k (e + damping h / h_max (e - e of the substep before)),   e = C beyond the slack
 //
 // h is the largest part of dt up to h_max = 0.98 * 2 / sqrt((1 + 2 damping) G), G a bound of the springs' eigenvalues
 // at the start. Place rows are met after each substep, by the constant factor of N M^-1 N^T; fixed control points move

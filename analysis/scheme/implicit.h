@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Implicit steps: each the least of an incremental potential of inertia, elastic energy, the strain limit as energy,
+// Implicit steps: each minimises an incremental potential of inertia, elastic energy, the strain limit as energy,
 // loads, drag and wind. [Kane et al. 2000; Bank et al. 1985; Newmark 1959]
 #pragma once
 
@@ -27,9 +27,8 @@ struct ImplicitOptions {
 //   TR-BDF2         to g dt by Newmark's, then from both by BDF2,  beta = g dt/2, g = 2 - sqrt 2
 // with a0 the whole acceleration at the start. Newton's method with the exact tangent, the positive one where that has
 // no factor, and a searched step; forces of limits and pins as PrimalDual finds them.
-//   (1) any step size is stable; (2) drag is implicit; (3) a step without a minimum says so (ProjectionReport) and
-//   leaves
-//       the state where it came to; (4) the same bits for any number of threads.
+//   (1) any step size is stable; (2) drag is implicit; (3) a step that finds no minimum says so (ProjectionReport) and
+//       leaves the state that it reached; (4) the same bits for any number of threads.
 class ImplicitScheme {
  public:
   // The system's rows, if any, are taken from its constraint solver, which is told the forces for reactions; the system

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// SIGINT and SIGTERM as a question that the program asks itself.
+// SIGINT and SIGTERM as a flag that the program polls.
 #pragma once
 
 #include <csignal>

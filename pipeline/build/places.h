@@ -51,8 +51,8 @@ struct HeldPlace {
   std::vector<int> control_points;         // of the panel's net, ascending
   std::vector<std::array<int, 2>> across;  // of a clamped edge: each of its control points and the next one inwards
   std::vector<Eigen::Vector2d> points;     // parameters
-  // Of `points` so many must be held by rows; of the others as many as are independent enough. Of a curve: both ends
-  // where it is open, three points where it closes.
+  // The first so many of `points` must be held by rows, the others only where they are independent enough. For a curve:
+  // both ends where it is open, three points where it closes.
   std::size_t required = 0;
   std::vector<Eigen::Vector2d> curve;  // 200 places or more along the curve: what rows don't hold shows as gaps there
 };

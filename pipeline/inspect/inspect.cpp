@@ -76,7 +76,7 @@ std::vector<std::string> repair_lines(const std::vector<LoopRepair>& repairs, bo
     out.push_back(
         fmt::format("loop {}: {} at (u, v) = ({}, {})", repair.loop, repair.what, repair.place.x(), repair.place.y()));
     if (repair.move > 0) out.back() += fmt::format(", by {:.2g}", repair.move);
-    if (group.count > 1) out.back() += fmt::format("; {} such, this the largest move", group.count);
+    if (group.count > 1) out.back() += fmt::format("; {} such repairs, this one the largest", group.count);
   }
   return out;
 }
@@ -355,7 +355,7 @@ std::string inspect_text(const Inspection& inspection, bool points) {
     out += "  warning      " + inspection.warnings[k] + '\n';
   }
   if (!points && inspection.warnings.size() > shown) {
-    out += fmt::format("  and {} warnings more: -v lists all\n", inspection.warnings.size() - shown);
+    out += fmt::format("  and {} more warnings: -v lists all\n", inspection.warnings.size() - shown);
   }
   for (std::size_t k = 0; points && k < inspection.notes.size(); ++k)
     out += "  note         " + inspection.notes[k] + '\n';

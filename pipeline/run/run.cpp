@@ -299,7 +299,7 @@ class Run::Impl {
     if (!(e.injected > scene_.energy_gain * exchanged) || !(e.injected > result_.watch.rounding)) return;
     result_.exit = RunExit::check_failed;
     result_.reason = fmt::format(
-        "the energy grew by {:.2g} % of the energy exchanged with no matching work, allowed are {:.2g} % "
+        "the energy grew by {:.2g} % of the energy exchanged with no matching work, {:.2g} % is allowed "
         "(solver.energy_gain): a smaller dt or a lower strain_limit.stiffness is more accurate",
         100 * e.injected / exchanged, 100 * scene_.energy_gain);
   }
@@ -413,7 +413,7 @@ class Run::Impl {
     if (by_percentile() && p.place_violation <= 1e-6) {
       result_.reason = fmt::format(
           "{:.4g} % of the rows are within the strain limit at the end, strain_limit.percentile asks for {:.4g} %; the "
-          "worst has {:.3g} {}. A higher strain_limit.stiffness holds more, solver = \"projection\" all",
+          "worst has {:.3g} {}. A higher strain_limit.stiffness holds more, solver = \"projection\" holds all",
           100 * p.within, scene_.strain_limit.percentile, p.strain_violation, worst_place());
       return;
     }

@@ -88,7 +88,7 @@ struct RunHooks {
 // Potential of a state in the scene's gravity, against the start [J].
 double gravity_potential(const Build& build, const Eigen::VectorXd& q);
 
-// So far may material points swing when let go at the end of a run until rest [m].
+// How far material points may still swing when let go at the end of a run until rest [m].
 double rest_tolerance(const Build& build);
 
 // Steps land on frame times and release times (Schedule). With `dt` unset the step is 0.9 of the stable step of the

@@ -441,7 +441,7 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
   out.notes.push_back(fmt::format("{} panels, {} seams{}", pattern.file.panels.size(), pattern.stitches.size(),
                                   body ? ", a body" : ""));
   if (pattern.file.sizes.size() > 1) {
-    out.notes.push_back(fmt::format("sizes {}; read is {}: --size chooses", fmt::join(pattern.file.sizes, ", "),
+    out.notes.push_back(fmt::format("sizes {}; {} is read: --size chooses another", fmt::join(pattern.file.sizes, ", "),
                                     written.size.empty() ? "one for each piece" : written.size));
   }
   return out;
