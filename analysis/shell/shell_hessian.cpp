@@ -27,7 +27,7 @@ constexpr int pairs(int functions) {
 using FunctionRows = std::array<std::array<Lanes, most_rows>, SurfaceBasis::capacity>;
 
 // Rows of every function at a point of a group whose cells keep 1-D tables.
-void rows_of_product(const PanelLayout& layout, const Pack* along_u, const Pack* along_v, const Chain& c,
+void rows_of_product(const PanelLayout& layout, const LanePack* along_u, const LanePack* along_v, const Chain& c,
                      FunctionRows& rows) {
   for (int b = 0; b < layout.functions_v; ++b)
     for (int a = 0; a < layout.functions_u; ++a) {
@@ -94,7 +94,7 @@ void add_products(int functions, const FunctionRows& rows, const std::array<std:
 }
 
 template <int Rows>
-void group_hessian(const CellGroup& group, const PanelLayout& layout, TangentKind kind, const Pack* table,
+void group_hessian(const CellGroup& group, const PanelLayout& layout, TangentKind kind, const LanePack* table,
                    const double* q, LocalMatrix& local) {
   const int functions = layout.functions();
   local.assign(static_cast<std::size_t>(pairs(functions)), Block{});
@@ -120,9 +120,9 @@ void group_hessian(const CellGroup& group, const PanelLayout& layout, TangentKin
     }
     return;
   }
-  const Pack* along_u = table;
-  const Pack* along_v = along_u + 3 * group.gauss_u * layout.functions_u;
-  const Pack* point = along_v + 3 * group.gauss_v * layout.functions_v;
+  const LanePack* along_u = table;
+  const LanePack* along_v = along_u + 3 * group.gauss_u * layout.functions_u;
+  const LanePack* point = along_v + 3 * group.gauss_v * layout.functions_v;
   for (int j = 0; j < group.gauss_v; ++j)
     for (int i = 0; i < group.gauss_u; ++i, point += layout.header + 4) {
       rows_of_product(layout, along_u + 3 * i * layout.functions_u, along_v + 3 * j * layout.functions_v,
@@ -132,7 +132,7 @@ void group_hessian(const CellGroup& group, const PanelLayout& layout, TangentKin
 }
 
 [[gnu::noinline]] void group_hessian(const CellGroup& group, const PanelLayout& layout, TangentKind kind,
-                                     const Pack* table, const double* q, LocalMatrix& local) {
+                                     const LanePack* table, const double* q, LocalMatrix& local) {
   if (layout.rows == 2) group_hessian<2>(group, layout, kind, table, q, local);
   if (layout.rows == 4) group_hessian<4>(group, layout, kind, table, q, local);
   if (layout.rows == 5) group_hessian<5>(group, layout, kind, table, q, local);

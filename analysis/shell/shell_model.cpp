@@ -13,7 +13,7 @@
 namespace toile {
 namespace {
 
-inline PointJet<Lanes> interpolate(const Pack* table, int rows, int functions, const LocalNet& net) {
+inline PointJet<Lanes> interpolate(const LanePack* table, int rows, int functions, const LocalNet& net) {
   PointJet<Lanes> jet{};
   for (int k = 0; k < functions; ++k, table += rows) {
     add_scaled(jet.x1, table[0].v, net[k]);
@@ -27,7 +27,7 @@ inline PointJet<Lanes> interpolate(const Pack* table, int rows, int functions, c
 }
 
 // net += sum of rows times gradients.
-inline void accumulate(const Pack* table, int rows, int functions, const PointJet<Lanes>& g, LocalNet& net) {
+inline void accumulate(const LanePack* table, int rows, int functions, const PointJet<Lanes>& g, LocalNet& net) {
   for (int k = 0; k < functions; ++k, table += rows) {
     LaneVec sum = net[k];
     add_scaled(sum, table[0].v, g.x1);
@@ -52,7 +52,7 @@ inline void scale(PointJet<Lanes>& g, Lanes s) {
 // At every point: jets of the nets, point(header, jets) -> gradient per area, and its weighted image added to `out`.
 // Functions: their number where the compiler shall know it, else 0.
 template <int Functions, std::size_t Nets, class Point>
-void sweep_full(const CellGroup& group, const PanelLayout& layout, const Pack* table,
+void sweep_full(const CellGroup& group, const PanelLayout& layout, const LanePack* table,
                 const std::array<LocalNet, Nets>& nets, LocalNet& out, Point&& point) {
   const int functions = Functions > 0 ? Functions : layout.functions(), rows = layout.rows;
   const auto sweep = [&](auto fixed_rows) {
@@ -114,12 +114,12 @@ struct LineNet {
 // sweep_full from 1-D tables, contracting along v first: fewer operations from p = 3 on, a third of the memory.
 // Side: functions per direction where the compiler shall know it, else 0.
 template <int Side, std::size_t Nets, class Point>
-void sweep_tensor(const CellGroup& group, const PanelLayout& layout, const Pack* table,
+void sweep_tensor(const CellGroup& group, const PanelLayout& layout, const LanePack* table,
                   const std::array<LocalNet, Nets>& nets, LocalNet& out, Point&& point) {
   const int nu = Side > 0 ? Side : layout.functions_u, nv = Side > 0 ? Side : layout.functions_v;
-  const Pack* along_u = table;
-  const Pack* along_v = along_u + 3 * group.gauss_u * nu;
-  const Pack* points = along_v + 3 * group.gauss_v * nv;
+  const LanePack* along_u = table;
+  const LanePack* along_v = along_u + 3 * group.gauss_u * nu;
+  const LanePack* points = along_v + 3 * group.gauss_v * nv;
   const bool bends = layout.law.bends();
   for (int j = 0; j < group.gauss_v; ++j, along_v += 3 * nv) {
     std::array<LineNet, Nets> lines;
@@ -138,7 +138,7 @@ void sweep_tensor(const CellGroup& group, const PanelLayout& layout, const Pack*
       }
     LineNet sums;
     for (int a = 0; a < nu; ++a) sums.n0[a] = sums.n1[a] = sums.n2[a] = LaneVec{};
-    const Pack* at = along_u;
+    const LanePack* at = along_u;
     for (int i = 0; i < group.gauss_u; ++i, at += 3 * nu) {
       const PointHeader header = point_header(points, layout.header);
       const Chain chain(points + layout.header);
@@ -181,8 +181,8 @@ void sweep_tensor(const CellGroup& group, const PanelLayout& layout, const Pack*
 }
 
 template <std::size_t Nets, class Point>
-void sweep(const CellGroup& group, const PanelLayout& layout, const Pack* table, const std::array<LocalNet, Nets>& nets,
-           LocalNet& out, Point&& point) {
+void sweep(const CellGroup& group, const PanelLayout& layout, const LanePack* table,
+           const std::array<LocalNet, Nets>& nets, LocalNet& out, Point&& point) {
   const bool square = layout.functions_u == layout.functions_v, tensor = group.gauss_u > 0;
   for (int k = 0; k < layout.functions(); ++k) out[k] = LaneVec{};
   if (square && layout.functions_u == 3)
@@ -197,7 +197,7 @@ void sweep(const CellGroup& group, const PanelLayout& layout, const Pack* table,
 
 // Compiled once: a second copy might round otherwise.
 [[gnu::noinline]] PointEnergy<Lanes> group_gradient(const CellGroup& group, const PanelLayout& layout,
-                                                    const Pack* table, const double* q, LocalNet& gradient) {
+                                                    const LanePack* table, const double* q, LocalNet& gradient) {
   std::array<LocalNet, 1> net;
   gather(group, layout, layout.functions(), q, net[0]);
   PointEnergy<Lanes> total{};
@@ -215,7 +215,7 @@ void sweep(const CellGroup& group, const PanelLayout& layout, const Pack* table,
 
 // K dq of a group; the parts of dq . K dq of every lane are returned.
 [[gnu::noinline]] PointEnergy<Lanes> group_tangent(const CellGroup& group, const PanelLayout& layout, TangentKind kind,
-                                                   const Pack* table, const double* q, const double* dq,
+                                                   const LanePack* table, const double* q, const double* dq,
                                                    LocalNet& image) {
   std::array<LocalNet, 2> nets;
   gather(group, layout, layout.functions(), q, nets[0]);
@@ -278,7 +278,7 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, Workers* worke
     total.most = larger(total.most, part.most);
   };
   if (!workers || workers->count() < 2 || point_count < least_points_for_threads) {
-    for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
+    for_each_group([&](const CellGroup& group, const PanelLayout& layout, const LanePack* table) {
       LocalNet local;
       add(image(group, layout, table, local));
       scatter(group, layout, local, [&](int point, double x, double y, double z) { subtract(out, point, x, y, z); });
@@ -380,7 +380,7 @@ void ShellModel::Impl::fill(CellGroup& group) {
   for (int l = 0; l < lane_count; ++l) {
     const CellRule& cell = panel.quadrature.cells[group.cell[l]];
     const Eigen::Vector2d* points = panel.quadrature.points.data() + cell.first;
-    Pack* table = tables.data() + group.table;
+    LanePack* table = tables.data() + group.table;
     const auto put = [&](double value) { (table++)->v[l] = value; };
     const auto put_line = [&](const KnotVector& knots, int span, double parameter) {
       BasisValues line;
@@ -461,12 +461,12 @@ std::size_t ShellModel::quadrature_points() const {
   return impl_->point_count;
 }
 std::size_t ShellModel::table_bytes() const {
-  return impl_->tables.size() * sizeof(Pack);
+  return impl_->tables.size() * sizeof(LanePack);
 }
 
 ShellEnergy ShellModel::Impl::subtract_gradient(const double* q, double* out, Workers* workers) const {
   const PointEnergy<Lanes> total = subtract_images(
-      out, workers, [&](const CellGroup& group, const PanelLayout& layout, const Pack* table, LocalNet& local) {
+      out, workers, [&](const CellGroup& group, const PanelLayout& layout, const LanePack* table, LocalNet& local) {
         return group_gradient(group, layout, table, q, local);
       });
   double strips = 0;
@@ -500,10 +500,11 @@ void ShellModel::add_force_change(const Eigen::Ref<const Eigen::VectorXd>& q,
                                   const Eigen::Ref<const Eigen::VectorXd>& dq, Eigen::Ref<Eigen::VectorXd> df,
                                   TangentKind kind, Workers* workers) const {
   assert(q.size() == rest().size() && dq.size() == q.size() && df.size() == q.size());
-  impl_->subtract_images(df.data(), workers,
-                         [&](const CellGroup& group, const PanelLayout& layout, const Pack* table, LocalNet& local) {
-                           return group_tangent(group, layout, kind, table, q.data(), dq.data(), local);
-                         });
+  impl_->subtract_images(
+      df.data(), workers,
+      [&](const CellGroup& group, const PanelLayout& layout, const LanePack* table, LocalNet& local) {
+        return group_tangent(group, layout, kind, table, q.data(), dq.data(), local);
+      });
   for (const KinkStrip& strip : impl_->kinks)
     add_kink_tangent(strip, impl_->layouts[strip.panel].law, q.data(), dq.data(), df.data());
 }
@@ -519,7 +520,7 @@ CellShare ShellModel::stiffest_cell(const Eigen::Ref<const Eigen::VectorXd>& q,
                                     const Eigen::Ref<const Eigen::VectorXd>& dq) const {
   CellShare best;
   double largest = -1;
-  impl_->for_each_group([&](const CellGroup& group, const PanelLayout& layout, const Pack* table) {
+  impl_->for_each_group([&](const CellGroup& group, const PanelLayout& layout, const LanePack* table) {
     LocalNet ignored;
     const auto work = group_tangent(group, layout, TangentKind::upper, table, q.data(), dq.data(), ignored);
     for (int l = 0; l < group.lanes; ++l) {

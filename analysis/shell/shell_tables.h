@@ -16,7 +16,7 @@
 
 namespace toile {
 
-struct Pack {
+struct LanePack {
   Lanes v;
 };
 
@@ -29,7 +29,7 @@ struct CellGroup {
   std::array<int, lane_count> cell{};   // in the panel's quadrature
   std::array<int, lane_count> first{};  // lowest control point of the cell's functions, global
   int gauss_u = 0, gauss_v = 0;         // points per direction where the cells keep 1-D tables, else 0
-  // First Pack. Full tables: for each point its header (weight, rest curvatures), then the rows of each function.
+  // First LanePack. Full tables: for each point its header (weight, rest curvatures), then the rows of each function.
   // 1-D tables: N, N', N'' of each function at each Gauss abscissa along u, then along v; then for each point its
   // header and d xi / dX (eq. 5 inverted).
   std::size_t table = 0;
@@ -101,7 +101,7 @@ struct PointHeader {
   Lanes weight;
   Curvature<Lanes> rest;
 };
-inline PointHeader point_header(const Pack* table, int size) {
+inline PointHeader point_header(const LanePack* table, int size) {
   PointHeader header{table[0].v, {}};
   if (size > 1) header.rest.k11 = table[1].v, header.rest.k22 = table[2].v;
   if (size > 3) header.rest.k12 = table[3].v;
@@ -110,7 +110,7 @@ inline PointHeader point_header(const Pack* table, int size) {
 
 // d xi / dX and its products that second derivatives need.
 struct Chain {
-  explicit Chain(const Pack* d) : u1(d[0].v), v1(d[1].v), u2(d[2].v), v2(d[3].v) {}
+  explicit Chain(const LanePack* d) : u1(d[0].v), v1(d[1].v), u2(d[2].v), v2(d[3].v) {}
   Lanes u1, v1, u2, v2;  // d u / dX1, d v / dX1, d u / dX2, d v / dX2
 };
 
@@ -143,7 +143,7 @@ struct ShellModel::Impl {
   const std::vector<int>& first;
   std::vector<PanelLayout> layouts;
   std::vector<CellGroup> groups;
-  std::vector<Pack> tables;
+  std::vector<LanePack> tables;
   std::vector<KinkStrip> kinks;
   std::size_t point_count = 0;
   mutable std::unique_ptr<SharedWork> work;  // for the number of threads that came last
