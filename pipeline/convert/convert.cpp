@@ -2,31 +2,23 @@
 #include "pipeline/convert/convert.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <limits>
 #include <map>
 #include <numbers>
 
 #include "geometry/error.h"
-#include "io/mesh_files.h"
-#include "io/net_files.h"
+#include "io/file_formats.h"
 #include "io/obj.h"
 #include "io/panel_file.h"
-#include "io/vtu.h"
 #include "pipeline/scene/scene.h"
 #include "pipeline/scene/toml_table.h"
 #include "trimming/triangulation.h"
 
 namespace toile {
 namespace {
-
-std::string ending_of(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  return ending;
-}
 
 bool asks(const InspectOptions& options) {
   return options.degree || options.span || options.spans;
@@ -194,7 +186,7 @@ Meshes mesh(const PanelFile& file, const std::vector<std::size_t>& chosen, const
 
 // Nets need no valid trim: they are written as they are.
 std::string net_text(const PanelFile& file, const std::vector<std::size_t>& chosen, const InspectOptions& options,
-                     bool json) {
+                     const NamedFormat& format) {
   std::vector<NurbsSurface> surfaces;
   for (const std::size_t k : chosen) {
     const NurbsSurface surface = refined(file.panels[k], options);
@@ -207,20 +199,20 @@ std::string net_text(const PanelFile& file, const std::vector<std::size_t>& chos
     panel.surface = &surfaces[i];
     panel.face = &file.panels[chosen[i]];
   }
-  const Frame frame{0, 0, panels};
-  return json ? format_net_json(frame) : format_net_csv(frame);
+  return format.text({0, 0, panels}, {});
 }
 
 std::filesystem::path material_path(std::filesystem::path target) {
   return target.replace_extension(".mtl");
 }
 
-std::string mesh_text(const Frame& frame, const std::string& ending, const std::filesystem::path& target) {
-  if (ending == ".obj") return format_obj(frame, material_path(target).filename().string());
-  if (ending == ".ply") return format_ply(frame);
-  if (ending == ".stl") return format_stl(frame);
-  if (ending == ".glb") return format_glb(frame);
-  return format_vtu(frame).triangles;
+const NamedFormat& format_of(const std::filesystem::path& target) {
+  const std::string ending = target.extension().string();
+  if (const auto format = format_with_ending(ending)) return named_format(*format);
+  std::vector<std::string_view> endings;
+  for (const NamedFormat& format : file_formats()) endings.push_back(format.ending);
+  throw InputError(
+      fmt::format("{}: can't write '{}' files; use one of {}", target.string(), ending, fmt::join(endings, ", ")));
 }
 
 Eigen::Vector3d up_of(const PanelFile& file, const ConvertOptions& options) {
@@ -239,21 +231,13 @@ std::optional<Eigen::Vector3d> axis_named(std::string_view word) {
 }
 
 std::vector<std::filesystem::path> conversion_targets(const std::filesystem::path& out) {
-  if (ending_of(out) == ".obj") return {out, material_path(out)};
+  if (format_with_ending(out.extension().string()) == FileFormat::obj) return {out, material_path(out)};
   return {out};
 }
 
 Conversion convert(const PanelFile& source, const std::filesystem::path& target, const ConvertOptions& options) {
-  const std::string ending = ending_of(target);
-  const auto is = [&](std::initializer_list<std::string_view> endings) {
-    return std::ranges::find(endings, ending) != endings.end();
-  };
-  const bool iges = is({".igs", ".iges"});
-  if (!iges && !is({".svg", ".obj", ".ply", ".stl", ".glb", ".vtu", ".json", ".csv"})) {
-    throw InputError(
-        fmt::format("{}: can't write '{}' files; use .igs, .svg, .obj, .ply, .stl, .glb, .vtu, .json or .csv",
-                    target.string(), ending));
-  }
+  const NamedFormat& format = format_of(target);
+  const bool iges = format.what == FormatContent::faces;
   PanelFile file = source;
   leave_out_invalid(file);
   const std::vector<std::size_t> panels = chosen(file, options.only);
@@ -263,7 +247,7 @@ Conversion convert(const PanelFile& source, const std::filesystem::path& target,
   out.details = file.notes;
   out.refused = file.refused;
   out.panels = panels.size();
-  if (iges || is({".svg"})) {
+  if (iges || format.what == FormatContent::drawing) {
     PanelFile part = file;
     if (some) part.panels.clear();
     for (std::size_t k = 0; some && k < panels.size(); ++k) part.panels.push_back(file.panels[panels[k]]);
@@ -273,15 +257,15 @@ Conversion convert(const PanelFile& source, const std::filesystem::path& target,
       out.bytes = print_svg(part);
       out.notes.push_back("print at 100 %: one unit is a millimetre");
     }
-  } else if (is({".json", ".csv"})) {
-    out.bytes = net_text(file, panels, options.refine, ending == ".json");
+  } else if (format.what == FormatContent::nets) {
+    out.bytes = net_text(file, panels, options.refine, format);
     out.notes.push_back("control nets in metres");
   } else {
     const Meshes meshes = mesh(file, panels, options.refine, out);
     const Frame frame{0, 0, meshes.panels, up_of(file, options)};
-    out.bytes = mesh_text(frame, ending, target);
-    if (ending == ".obj") out.beside.emplace_back(material_path(target), format_mtl());
-    if (ending == ".glb") out.notes.push_back("turned so that +Y is up");
+    out.bytes = format.text(frame, material_path(target).filename().string());
+    if (format.format == FileFormat::obj) out.beside.emplace_back(material_path(target), format_mtl());
+    if (format.format == FileFormat::glb) out.notes.push_back("turned so that +Y is up");
   }
   return out;
 }

@@ -12,8 +12,8 @@
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "io/file.h"
+#include "io/file_formats.h"
 #include "io/mesh_files.h"
-#include "io/net_files.h"
 #include "io/obj.h"
 #include "io/vtu.h"
 #include "pipeline/picture/preview.h"
@@ -21,6 +21,8 @@
 
 namespace toile {
 namespace {
+
+constexpr const char* material_name = "cloth.mtl";  // of all frames
 
 struct OutputUnit {
   std::string name;
@@ -108,38 +110,6 @@ IgesOutput draped_file(const Build& build, const Eigen::VectorXd& q) {
   header.levels = {{1, "flat"}, {2, "draped"}};
   return format_iges(faces, header);
 }
-
-namespace {
-
-// Of all frames.
-constexpr const char* material_name = "cloth.mtl";
-
-struct FileFormat {
-  const char* ending;
-  FileSink::Format format;
-};
-FileFormat file_format(FrameFormat format) {
-  switch (format) {
-    case FrameFormat::obj:
-      return {".obj", [](const Frame& frame) { return format_obj(frame, material_name); }};
-    case FrameFormat::ply:
-      return {".ply", format_ply};
-    case FrameFormat::stl:
-      return {".stl", format_stl};
-    case FrameFormat::glb:
-      return {".glb", format_glb};
-    case FrameFormat::json:
-      return {".json", format_net_json};
-    case FrameFormat::csv:
-      return {".csv", format_net_csv};
-    case FrameFormat::iges:
-    case FrameFormat::vtu:
-      break;
-  }
-  throw std::logic_error("a frame format without files of its own");
-}
-
-}  // namespace
 
 struct FrameWriter::Impl {
   const Build& build;
@@ -234,16 +204,17 @@ struct FrameWriter::Impl {
 FrameWriter::FrameWriter(const Build& build, std::filesystem::path directory, const std::vector<double>& written)
     : impl_(new Impl{build, std::move(directory) / "frames", {}, {}, false, {}}) {
   const int next = static_cast<int>(written.size());
-  for (const FrameFormat format : build.scene.formats) {
-    if (format == FrameFormat::iges) {
+  for (const FileFormat format : build.scene.formats) {
+    if (format == FileFormat::iges) {
       impl_->iges = true;
-    } else if (format == FrameFormat::vtu) {
+    } else if (format == FileFormat::vtu) {
       impl_->sinks.push_back(std::make_unique<VtuSink>(impl_->frames, build.scene.name, written));
     } else {
-      const FileFormat file = file_format(format);
-      impl_->sinks.push_back(std::make_unique<FileSink>(impl_->frames, file.ending, file.format, next));
+      const NamedFormat& file = named_format(format);
+      const auto text = [&file](const Frame& frame) { return file.text(frame, material_name); };
+      impl_->sinks.push_back(std::make_unique<FileSink>(impl_->frames, std::string(file.ending), text, next));
     }
-    if (format == FrameFormat::obj) impl_->material = material_name;
+    if (format == FileFormat::obj) impl_->material = material_name;
   }
 }
 

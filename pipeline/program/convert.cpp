@@ -2,12 +2,15 @@
 #include "pipeline/convert/convert.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <cctype>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "io/file.h"
+#include "io/file_formats.h"
 #include "pipeline/base/exit_code.h"
 #include "pipeline/base/json_text.h"
 #include "pipeline/program/commands.h"
@@ -25,12 +28,37 @@ struct Arguments {
   PanelChoice choice;
 };
 
-constexpr const char* about_target =
-    "File to write: .igs; .svg (drawings at 1:1); .obj, .ply, .stl, .glb, .vtu (triangles of the cloth); .json, .csv "
-    "(control nets). Triangles and nets are in metres and in the axes of IN; GLB alone is turned, so that +Y points "
-    "up, "
-    "as its standard says. Texture coordinates: the patterns laid out in 0..1, v from the top in GLB, else from below. "
-    "\"NAME flat\" and \"NAME draped\" of a draped.igs have the same triangles, as for a morph";
+// ".igs; .svg (drawings at 1:1); .obj, .ply (triangles of the cloth)".
+std::string endings() {
+  const std::pair<FormatContent, const char*> groups[] = {{FormatContent::faces, ""},
+                                                          {FormatContent::drawing, " (drawings at 1:1)"},
+                                                          {FormatContent::triangles, " (triangles of the cloth)"},
+                                                          {FormatContent::nets, " (control nets)"}};
+  std::vector<std::string> out;
+  for (const auto& [what, words] : groups) {
+    std::vector<std::string_view> of_group;
+    for (const NamedFormat& format : file_formats())
+      if (format.what == what) of_group.push_back(format.ending);
+    out.push_back(fmt::format("{}{}", fmt::join(of_group, ", "), words));
+  }
+  return fmt::format("{}", fmt::join(out, "; "));
+}
+
+std::string about() {
+  std::string names;
+  for (const NamedFormat& format : file_formats()) {
+    for (const char c : format.name) names += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    names += ", ";
+  }
+  return "Panels to " + names + "by the ending of OUT";
+}
+
+std::string about_target() {
+  return "File to write: " + endings() +
+         ". Triangles and nets are in metres and in the axes of IN; GLB alone is turned, so that +Y points up, as its "
+         "standard says. Texture coordinates: the patterns laid out in 0..1, v from the top in GLB, else from below. "
+         "\"NAME flat\" and \"NAME draped\" of a draped.igs have the same triangles, as for a morph";
+}
 
 ConvertOptions options_of(const Arguments& a) {
   ConvertOptions options;
@@ -68,9 +96,9 @@ int run(const Arguments& a, const Common& common, Console& console) {
 
 Action convert_command(Command& command) {
   const auto a = std::make_shared<Arguments>();
-  command.about("Panels to IGES, SVG (1:1), OBJ, PLY, STL, GLB, VTU, JSON or CSV, by the ending of OUT")
+  command.about(about())
       .operand("IN", a->input, "IGES, pattern JSON or DXF")
-      .operand("OUT", a->target, about_target)
+      .operand("OUT", a->target, about_target())
       .texts("--only NAME", a->only, "The panel of this name; may repeat")
       .text("--up AXIS", a->up, "GLB: which axis of IN points up (as draped.igs says; else z for IGES, y for patterns)")
       .overwrite("Replace OUT where it is there")

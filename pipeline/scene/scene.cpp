@@ -450,13 +450,11 @@ SceneObstacle read_obstacle(Table table, const std::filesystem::path& scene) {
   return obstacle;
 }
 
-FrameFormat frame_format(Table& table, const toml::node& entry) {
-  static const std::vector<std::string> names{"iges", "vtu", "obj", "ply", "stl", "glb", "json", "csv"};
+FileFormat frame_format(Table& table, const toml::node& entry) {
   const std::string name = entry.value<std::string>().value_or("");
-  const auto found = std::ranges::find(names, name);
-  if (found == names.end())
-    table.fail(entry, fmt::format("unknown frame format '{}'{}", name, suggestion(name, names)));
-  return static_cast<FrameFormat>(found - names.begin());
+  for (const NamedFormat& format : file_formats())
+    if (format.of_frames && format.name == name) return format.format;
+  table.fail(entry, fmt::format("unknown frame format '{}'{}", name, suggestion(name, frame_format_names())));
 }
 
 void read_output(Table table, Scene& scene) {

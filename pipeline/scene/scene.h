@@ -14,6 +14,7 @@
 #include "analysis/constraint/point_rule.h"
 #include "analysis/fabric/fabric.h"
 #include "analysis/projection/limit_law.h"
+#include "io/file_formats.h"
 #include "io/iges.h"
 #include "io/panel_file.h"
 #include "pipeline/scene/addresses.h"
@@ -137,8 +138,6 @@ struct OutputPoint {
   std::string where;
 };
 
-enum class FrameFormat { iges, vtu, obj, ply, stl, glb, json, csv };
-
 // The rows of history.csv.
 enum class HistoryRows { off, frames, steps };
 
@@ -169,7 +168,7 @@ struct Scene {
   std::optional<SceneRest> rest;     // set: until the cloth is at rest
   std::optional<double> time_limit;  // s of wall time for the program; unset: none
   double every = 1.0 / 30;           // s between frames
-  std::vector<FrameFormat> formats{FrameFormat::vtu};
+  std::vector<FileFormat> formats{FileFormat::vtu};  // of frames
   HistoryRows history = HistoryRows::frames;
   bool preview = true;
   std::vector<OutputPoint> points;

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "geometry/error.h"
+#include "io/file_formats.h"
 #include "pipeline/scene/scene.h"
 #include "pipeline/scene/toml_table.h"
 #include "pipeline/study/study.h"
@@ -128,7 +129,7 @@ Json particular(const std::string& path) {
   static const std::map<std::string, Json> values = {
       {"solver.dt", word_or("auto", quantity(dimension::time, Range::positive))},
       {"solver.until", word_or("rest", quantity(dimension::time, Range::positive))},
-      {"output.formats", {{"type", "array"}, {"items", {{"enum", {"iges", "vtu", "obj"}}}}}},
+      {"output.formats", {{"type", "array"}, {"items", {{"enum", frame_format_names()}}}}},
       {"fabric", {{"type", "object"}, {"additionalProperties", reference("fabric_NAME")}}},
       {"columns", one_or_several(string)},
       {"set", any_table},

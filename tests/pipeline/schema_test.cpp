@@ -16,6 +16,7 @@
 
 #include "geometry/error.h"
 #include "io/file.h"
+#include "io/file_formats.h"
 #include "pipeline/scene/scene.h"
 #include "pipeline/scene/toml_table.h"
 #include "pipeline/study/study.h"
@@ -177,6 +178,19 @@ TEST(Schema, KnowsEveryKeyThatTheReadersAskFor) {
     }
   }
   EXPECT_GT(asked, 300);
+}
+
+TEST(Schema, TakesTheFrameFormatsThatTheReaderTakes) {
+  const Validator scenes(scene_schema());
+  for (const NamedFormat& format : file_formats()) {
+    const std::string text = std::string("[[panel]]\nfile = \"/proc/version\"\n[output]\nformats = [\"") +
+                             std::string(format.name) + "\"]\n";
+    EXPECT_EQ(scenes.check(json_of(text, "scene.toml")).empty(), format.of_frames) << format.name;
+    if (format.of_frames)
+      EXPECT_EQ(parse_scene(text, "scene.toml").formats, std::vector{format.format});
+    else
+      EXPECT_THROW(parse_scene(text, "scene.toml"), InputError) << format.name;
+  }
 }
 
 TEST(Schema, EveryKeyHasItsWordsAndEveryWordAKey) {
