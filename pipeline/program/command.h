@@ -22,13 +22,20 @@ struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// An option of the call, with its values as they were typed; a flag has none.
+struct TypedOption {
+  std::string name;  // the long one: "--set"
+  std::vector<std::string> values;
+};
+
 // Options that every command takes, so that a script can pass them to any. A command's help shows those that change
 // what it does.
 struct Common {
   bool quiet = false, verbose = false, json = false, no_progress = false, overwrite = false;
   std::string colour = "auto";
-  int threads = 0;                // unset: the command's own number
-  std::string program = "toile";  // as it was called
+  int threads = 0;                 // unset: the command's own number
+  std::string program = "toile";   // as it was called
+  std::vector<TypedOption> typed;  // all options of the call, the command's own among them, as they are declared
 };
 
 // What a command does once its words are read; returns the exit code.

@@ -77,6 +77,16 @@ std::vector<std::string> option_names(const CLI::App& command) {
   return names;
 }
 
+std::vector<TypedOption> typed_options(const CLI::App& command) {
+  std::vector<TypedOption> typed;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0 || option->get_lnames().empty()) continue;
+    const bool flag = option->get_expected_min() == 0;
+    typed.push_back({"--" + option->get_lnames().front(), flag ? std::vector<std::string>() : option->results()});
+  }
+  return typed;
+}
+
 // What an option's value may be, where its name lists it: "auto|never" and not "LENGTH".
 std::vector<std::string> values_of(const std::string& value) {
   std::vector<std::string> values;
@@ -154,6 +164,7 @@ CommandLine read_command_line(int argc, char** argv) {
   }
   line.common = program.common;
   line.common.program = argv[0];
+  line.common.typed = typed_options(*program.chosen());
   for (std::size_t k = 0; k < program.actions.size(); ++k) {
     if (*program.app.get_subcommand(commands[k].name)) line.action = program.actions[k];
   }

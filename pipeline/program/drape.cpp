@@ -7,6 +7,7 @@
 #include <csignal>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "pipeline/base/exit_code.h"
 #include "pipeline/output/summary.h"
@@ -23,20 +24,15 @@ struct Arguments {
   bool dry = false;
 };
 
-// The words of this call, to go on from where the run stops.
+// The words of this call without those of its folder, to go on from where the run stops.
 std::string words(const Arguments& a, const Common& common) {
+  constexpr std::string_view of_the_folder[] = {"--output", "--overwrite", "--resume"};
   std::string out = shell_word(common.program) + " drape " + shell_word(a.scene.input);
-  const auto add = [&](const char* option, const std::string& value) {
-    if (!value.empty()) out += fmt::format(" {} {}", option, shell_word(value));
-  };
-  for (const std::string& setting : a.scene.settings) add("--set", setting);
-  for (const std::string& pin : a.scene.pins) add("--pin", pin);
-  add("--until", a.scene.until);
-  add("--time-limit", a.scene.time_limit);
-  add("--fabric", a.scene.fabric);
-  add("--span", a.scene.span);
-  if (a.scene.degree > 0) add("--degree", std::to_string(a.scene.degree));
-  if (common.threads > 0) add("--threads", std::to_string(common.threads));
+  for (const auto& [name, values] : common.typed) {
+    if (std::ranges::find(of_the_folder, name) != std::end(of_the_folder)) continue;
+    if (values.empty()) out += " " + name;
+    for (const std::string& value : values) out += fmt::format(" {} {}", name, shell_word(value));
+  }
   return out;
 }
 

@@ -191,21 +191,39 @@ TEST(Words, TheWallTimeIncludesFiles) {
   EXPECT_GE(whole + 0.005, report["wall_seconds"].get<double>() + files);
 }
 
-// The command is copied into a shell as it stands.
+// The command that a stopped run shows is copied into a shell as it stands, but for the time limit.
+Outcome go_on(const Folder& folder, const Outcome& stopped) {
+  const std::size_t at = stopped.err.find("to go on from here:\n");
+  if (at == std::string::npos) return stopped;
+  std::string command = stopped.err.substr(at + 20);
+  command.pop_back();
+  return shell(folder, std::regex_replace(command, std::regex("--time-limit 1e-9"), "--time-limit 600"));
+}
+
 TEST(Words, AStoppedRunSaysHowToGoOn) {
   const Small folder("go_on");
   const std::string options = "drape scene.toml --set 'pin.0.at=\"curve:0,2\"' --until 0.05 ";
   const Outcome stopped = toile(folder, options + "-o 'the result' --time-limit 1e-9");
   ASSERT_EQ(stopped.code, 7) << stopped.err;
-  const std::size_t at = stopped.err.find("to go on from here:\n");
-  ASSERT_NE(at, std::string::npos) << stopped.err;
-  std::string command = stopped.err.substr(at + 20);
-  command.pop_back();
-  command = std::regex_replace(command, std::regex("--time-limit 1e-9"), "--time-limit 600");
-  const Outcome resumed = shell(folder, command);
-  ASSERT_EQ(resumed.code, 0) << command << "\n" << resumed.err;
+  const Outcome resumed = go_on(folder, stopped);
+  ASSERT_EQ(resumed.code, 0) << stopped.err << resumed.err;
   ASSERT_EQ(toile(folder, options + "-o whole").code, 0);
   EXPECT_EQ(read_file(folder / "the result/draped.igs"), read_file(folder / "whole/draped.igs"));
+}
+
+TEST(Words, TheCommandToGoOnHasEveryOptionThatMadeTheRun) {
+  const Folder folder("go_on_all");
+  const std::string file = std::string(TOILE_SAMPLES) + "/dxf_pieces/apron.dxf";
+  const Outcome stopped = toile(
+      folder, "drape '" + file +
+                  "' --pin curve:0,0 --pin curve:0,2 --set output.preview=false --until 0.001 "
+                  "--size all --unit inch --outline sew --span '9 m' --degree 3 --fabric armor --threads 2 --json "
+                  "-o first --overwrite --time-limit 1e-9");
+  if (stopped.code == 3) GTEST_SKIP() << "built without dxflib";
+  ASSERT_EQ(stopped.code, 7) << stopped.err;
+  const Outcome resumed = go_on(folder, stopped);
+  ASSERT_EQ(resumed.code, 0) << stopped.err << resumed.err;
+  EXPECT_TRUE(nlohmann::json::accept(resumed.out)) << "--json";
 }
 
 TEST(Words, TheWarningOfStrainBetweenPointsNamesASpanThatHelps) {
