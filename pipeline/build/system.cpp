@@ -83,16 +83,13 @@ void hold_across(const std::vector<std::array<int, 2>>& across, const Eigen::Vec
 // What holds pins by component is PrimalDual.
 void require_solver_of_components(const Scene& scene) {
   const StrainLimit& limit = scene.strain_limit;
-  const char* const other = limit.solver == LimitSolver::lagrange               ? "strain_limit.solver = \"lagrange\""
-                            : limit.on && limit.solver == LimitSolver::substeps ? "strain_limit.solver = \"substeps\""
-                            : limit.on && limit.variant != ProjectionVariant::newton
-                                ? "strain_limit.variant = \"paper\""
-                                : nullptr;
-  for (std::size_t p = 0; other && p < scene.pins.size(); ++p) {
+  if (!limit.on || has_law(limit.solver)) return;
+  for (std::size_t p = 0; p < scene.pins.size(); ++p) {
     const ScenePin& pin = scene.pins[p];
     if (!pin.partial()) continue;
-    throw InputError(fmt::format("{}: pin {} ({}): hold leaves components free, which {} can't; leave that key out",
-                                 pin.where, p, pin.at.text, other));
+    throw InputError(
+        fmt::format("{}: pin {} ({}): hold leaves components free, which strain_limit.{} can't; leave that key out",
+                    pin.where, p, pin.at.text, setting_of(limit.solver)));
   }
 }
 
@@ -107,6 +104,31 @@ std::vector<TensorNet> nets_of(const Build& build) {
     nets.push_back({build.model->first_point(static_cast<int>(k)), net.count_u(), net.count_v()});
   }
   return nets;
+}
+
+// `partial`: some places are held in part of their components.
+std::unique_ptr<ConstraintSolver> constraint_solver(const Build& build, bool partial, const AffineMap& map,
+                                                    const Eigen::VectorXd& node_mass, ConstraintRows rows) {
+  const StrainLimit& limit = build.scene.strain_limit;
+  const ProjectionOptions options{
+      .tolerance = limit.tolerance, .regularisation = limit.regularisation, .max_iterations = limit.max_iterations};
+  const LimitSolver of_pins = partial ? LimitSolver::newton : LimitSolver::paper;
+  switch (limit.on ? limit.solver : of_pins) {
+    case LimitSolver::newton:
+      return std::make_unique<PrimalDual>(map, node_mass, std::move(rows), limit_options(limit));
+    case LimitSolver::substeps:
+      return std::make_unique<Substeps>(map, node_mass, std::move(rows),
+                                        SubstepsOptions{.weft = limit.weft,
+                                                        .warp = limit.warp,
+                                                        .tolerance = limit.tolerance,
+                                                        .percentile = limit.percentile,
+                                                        .nets = nets_of(build)});
+    case LimitSolver::paper:
+      return std::make_unique<FastProjection>(map, node_mass, std::move(rows), options);
+    case LimitSolver::lagrange:
+      return std::make_unique<LagrangeNewton>(map, node_mass, std::move(rows), options);
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -290,8 +312,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
       means.insert(means.end(), panel.mean_rows.begin(), panel.mean_rows.end());
     rows.strain = select_rows(*build.model, *system->map, system->points, rows.place, means);
     if (means.empty()) system->unbalanced = unbalanced_part(*build.model, *system->map, rows.strain);
-    if (limit.solver == LimitSolver::substeps ||
-        (limit.solver == LimitSolver::projection && limit.variant == ProjectionVariant::newton)) {
+    if (!hard(limit.solver)) {
       std::vector<double> stiffness;
       for (std::size_t k = 0; k < build.panels.size(); ++k)
         stiffness.push_back(limit_stiffness(build, static_cast<int>(k)));
@@ -311,24 +332,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     partial = partial || row.axes != Eigen::Vector3d::Ones();
   }
   if (!rows.strain.empty() || !rows.place.empty()) {
-    ProjectionOptions options;
-    options.tolerance = limit.tolerance;
-    options.regularisation = limit.regularisation;
-    options.max_iterations = limit.max_iterations;
-    if (limit.solver == LimitSolver::lagrange)
-      system->projection = std::make_unique<LagrangeNewton>(*system->map, dynamic.node_mass, std::move(rows), options);
-    else if (limit.on && limit.solver == LimitSolver::substeps)
-      system->projection = std::make_unique<Substeps>(*system->map, dynamic.node_mass, std::move(rows),
-                                                      SubstepsOptions{.weft = limit.weft,
-                                                                      .warp = limit.warp,
-                                                                      .tolerance = limit.tolerance,
-                                                                      .percentile = limit.percentile,
-                                                                      .nets = nets_of(build)});
-    else if (partial || (limit.on && limit.variant == ProjectionVariant::newton))
-      system->projection =
-          std::make_unique<PrimalDual>(*system->map, dynamic.node_mass, std::move(rows), limit_options(limit));
-    else
-      system->projection = std::make_unique<FastProjection>(*system->map, dynamic.node_mass, std::move(rows), options);
+    system->projection = constraint_solver(build, partial, *system->map, dynamic.node_mass, std::move(rows));
     system->projection->use_threads(dynamic.workers);
   }
   dynamic.projection = system->projection.get();

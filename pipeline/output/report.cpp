@@ -22,10 +22,6 @@ Json stress(const Extremes& e) {
           {"min_warp", e.min[1]}, {"max_warp", e.max[1]}, {"mean_warp", e.mean[1]}};
 }
 
-const char* solver_name(LimitSolver solver) {
-  return solver == LimitSolver::lagrange ? "lagrange" : solver == LimitSolver::substeps ? "substeps" : "projection";
-}
-
 Json measured(double value, const char* unit) {
   return {{"value", value}, {"unit", unit}};
 }
@@ -175,7 +171,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                           {"iterations_max", run.iterations_max},
                           {"gram_nonzeros", system.projection ? system.projection->gram_nonzeros() : 0},
                           {"unconverged_steps", run.unconverged_steps},
-                          {"solver", solver_name(scene.strain_limit.solver)}};
+                          {"solver", name(scene.strain_limit.solver)}};
   if (scene.strain_limit.on && scene.strain_limit.solver == LimitSolver::substeps) {
     report["projection"]["percentile"] = scene.strain_limit.percentile;
     report["projection"]["percentile_held"] = 100 * run.last_projection.within;

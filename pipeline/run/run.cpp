@@ -168,10 +168,7 @@ class Run::Impl {
     return bound;
   }
 
-  bool hard_limit() const {
-    const StrainLimit& limit = scene_.strain_limit;
-    return limit.on && (limit.solver == LimitSolver::lagrange || limit.variant == ProjectionVariant::paper);
-  }
+  bool hard_limit() const { return scene_.strain_limit.on && hard(scene_.strain_limit.solver); }
   bool by_percentile() const { return scene_.strain_limit.on && scene_.strain_limit.solver == LimitSolver::substeps; }
   // A step that the scene names is held to the bound once it has proved too large.
   bool bounded() const { return !implicit() && (!scene_.dt || result_.bound.dt > 0); }

@@ -490,6 +490,25 @@ std::string scene_name(const std::filesystem::path& path) {
   return folder.empty() ? stem : folder;
 }
 
+LimitSolver read_limit_solver(Table& table) {
+  const std::string variant = table.choice("variant", {"newton", "paper", "second-order"}, {}).value_or("newton");
+  // "fast" is another word for the projection.
+  const std::string solver =
+      table.choice("solver", {"projection", "fast", "substeps", "lagrange"}, {"springs"}).value_or("projection");
+  if (solver == "substeps") {
+    table.refuse("variant", "variant belongs to solver = \"projection\"");
+    return LimitSolver::substeps;
+  }
+  if (solver == "lagrange") {
+    for (const char* key : {"stiffness", "variant"})
+      table.refuse(
+          key,
+          fmt::format("{} belongs to solver = \"projection\"; \"lagrange\" holds the limit as hard equalities", key));
+    return LimitSolver::lagrange;
+  }
+  return variant == "paper" ? LimitSolver::paper : LimitSolver::newton;
+}
+
 // "mode": inextensible resists from the first strain on and stays within the tolerance; band lets cloth strain freely
 // to 90 % of the limits, each direction and sign its own.
 void read_limit(Table table, Scene& scene) {
@@ -535,27 +554,13 @@ void read_limit(Table table, Scene& scene) {
     table.number(stiffness, "stiffness", dimension::force_per_length, Range::positive);
     limit.stiffness = stiffness;
   }
-  if (const auto variant = table.choice("variant", {"newton", "paper", "second-order"}, {}))
-    limit.variant = *variant == "paper" ? ProjectionVariant::paper : ProjectionVariant::newton;
-  if (band && limit.variant == ProjectionVariant::paper)
-    throw InputError(table.where() + ": variant = \"paper\" has no bands");
+  limit.solver = read_limit_solver(table);
+  if (band && hard(limit.solver))
+    throw InputError(fmt::format("{}: {} has no bands", table.where(), setting_of(limit.solver)));
   table.number(limit.percentile, "percentile", dimension::none, Range::positive);
-  // "fast" is another word for the projection.
-  if (const auto solver = table.choice("solver", {"projection", "fast", "substeps", "lagrange"}, {"springs"});
-      solver && *solver == "substeps") {
-    limit.solver = LimitSolver::substeps;
-    table.refuse("variant", "variant belongs to solver = \"projection\"");
-    if (limit.percentile > 100)
-      table.fail(*table.raw().get("percentile"),
-                 fmt::format("percentile in [strain_limit] is {}, must be at most 100", limit.percentile));
-  } else if (solver && *solver == "lagrange") {
-    limit.solver = LimitSolver::lagrange;
-    if (band) throw InputError(table.where() + ": solver = \"lagrange\" has no bands");
-    for (const char* key : {"stiffness", "variant"})
-      table.refuse(
-          key,
-          fmt::format("{} belongs to solver = \"projection\"; \"lagrange\" holds the limit as hard equalities", key));
-  }
+  if (limit.percentile > 100)
+    table.fail(*table.raw().get("percentile"),
+               fmt::format("percentile in [strain_limit] is {}, must be at most 100", limit.percentile));
   if (limit.solver != LimitSolver::substeps)
     table.refuse("percentile", "percentile belongs to solver = \"substeps\"; the others limit every constraint point");
   std::vector<std::string> rules;
@@ -595,9 +600,7 @@ void read_solver(Table table, Scene& scene) {
     if (const auto n = rest->integer("max_steps", 1, 1000000000)) scene.rest->max_steps = *n;
     rest->done();
   }
-  const StrainLimit& limit = scene.strain_limit;
-  if (implicit(scene) && limit.on &&
-      (limit.solver != LimitSolver::projection || limit.variant != ProjectionVariant::newton))
+  if (implicit(scene) && scene.strain_limit.on && !has_law(scene.strain_limit.solver))
     throw InputError(table.where() +
                      ": implicit schemes and equilibrium by Newton's method take the strain limit as a law: solver = "
                      "\"projection\", variant = \"newton\" in [strain_limit]");
@@ -855,6 +858,41 @@ std::span<const FabricPreset> fabric_presets() {
       FabricPreset{"skirt", "skirt of example 4.3(a)", make(50, 0.118, 0.354, 1e-5, 0.8)},
   };
   return presets;
+}
+
+const char* name(LimitSolver solver) {
+  switch (solver) {
+    case LimitSolver::newton:
+    case LimitSolver::paper:
+      return "projection";
+    case LimitSolver::substeps:
+      return "substeps";
+    case LimitSolver::lagrange:
+      return "lagrange";
+  }
+  return "";
+}
+
+const char* setting_of(LimitSolver solver) {
+  switch (solver) {
+    case LimitSolver::newton:
+      return "solver = \"projection\"";
+    case LimitSolver::substeps:
+      return "solver = \"substeps\"";
+    case LimitSolver::paper:
+      return "variant = \"paper\"";
+    case LimitSolver::lagrange:
+      return "solver = \"lagrange\"";
+  }
+  return "";
+}
+
+bool hard(LimitSolver solver) {
+  return solver == LimitSolver::paper || solver == LimitSolver::lagrange;
+}
+
+bool has_law(LimitSolver solver) {
+  return solver == LimitSolver::newton;
 }
 
 bool implicit(const Scene& scene) {

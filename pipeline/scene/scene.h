@@ -104,8 +104,13 @@ struct SceneObstacle {
   std::string where;
 };
 
-enum class LimitSolver { projection, substeps, lagrange };
-enum class ProjectionVariant { newton, paper };  // PrimalDual; fast projection, eqs. (29) to (36)
+// What holds the strain limit, by solver and variant of [strain_limit]: PrimalDual, Substeps, FastProjection with eqs.
+// (29) to (36), LagrangeNewton.
+enum class LimitSolver { newton, substeps, paper, lagrange };
+const char* name(LimitSolver solver);        // "projection", "substeps" or "lagrange", as in reports
+const char* setting_of(LimitSolver solver);  // what asks for it: "variant = \"paper\""
+bool hard(LimitSolver solver);               // its rows have no stiffness, and no bands
+bool has_law(LimitSolver solver);            // LimitLaw, an energy that other schemes can take
 
 struct StrainLimit {
   bool on = false;
@@ -114,9 +119,8 @@ struct StrainLimit {
   bool stretched = false;           // whether a band limits stretch
   std::optional<double> stiffness;  // N/m of force per strain before the wall; unset: chosen by the loads
   PointRule points = PointRule::greville_derivative;  // at p = 2 the knot mesh
-  LimitSolver solver = LimitSolver::projection;
-  ProjectionVariant variant = ProjectionVariant::newton;  // of the projection
-  double regularisation = 1e-3;                           // the default of ProjectionOptions
+  LimitSolver solver = LimitSolver::newton;
+  double regularisation = 1e-3;  // the default of ProjectionOptions
   int max_iterations = 50;
   double percentile = 99.9;  // of the rows' area that substeps are to keep within the limit
 };
