@@ -17,6 +17,7 @@
 #pragma once
 
 #include "analysis/fabric/bending_law.h"
+#include "analysis/fabric/membrane_law.h"
 #include "analysis/shell/shell_model.h"
 
 namespace toile {
@@ -51,19 +52,17 @@ constexpr double crush = 0.5773502691896258;  // 1/sqrt(3)
 // A fabric's laws as the kernels read them; parts that carry nothing are skipped.
 struct PointLaw {
   explicit PointLaw(const Fabric& fabric)
-      : weft(fabric.membrane.weft),
-        warp(fabric.membrane.warp),
-        shear(fabric.membrane.shear),
-        coupling(fabric.membrane.coupling),
+      : membrane(fabric.membrane),
         twist(fabric.bending.twist),
         bending_coupling(fabric.bending.coupling),
-        guard(std::max(weft, warp)),
-        membrane(weft > 0 || warp > 0 || shear > 0),
+        guard(std::max(membrane.weft, membrane.warp)),
+        stretches(membrane.weft > 0 || membrane.warp > 0 || membrane.shear > 0),
         weft_warp_bending(fabric.bending.b0 > 0),
         bending(fabric.bending) {}
-  double weft, warp, shear, coupling, twist, bending_coupling;
+  Fabric::Membrane membrane;
+  double twist, bending_coupling;
   double guard;  // N/m, b
-  bool membrane, weft_warp_bending;
+  bool stretches, weft_warp_bending;
   BendingLaw bending;
   bool bends() const { return weft_warp_bending || twist > 0; }
   bool twists() const { return twist > 0; }
@@ -128,11 +127,9 @@ inline PointEnergy<Real> energy_gradient(const PointLaw& law, const PointJet<Rea
   PointEnergy<Real> energy{};
   const Vec3<Real> zero{energy.membrane, energy.membrane, energy.membrane};
   g.x1 = g.x2 = g.x11 = g.x22 = g.x12 = zero;
-  if (law.membrane) {
+  if (law.stretches) {
     const Real E11 = 0.5 * (dot(x.x1, x.x1) - 1.0), E22 = 0.5 * (dot(x.x2, x.x2) - 1.0), g12 = dot(x.x1, x.x2);
-    Real S11 = law.weft * E11, S22 = law.warp * E22;
-    const Real S12 = law.shear * g12;
-    if (law.coupling != 0) S11 = S11 + law.coupling * E22, S22 = S22 + law.coupling * E11;
+    const auto [S11, S22, S12] = membrane_stress(law.membrane, E11, E22, g12);
     energy.membrane = 0.5 * (S11 * E11 + S22 * E22 + S12 * g12);
     energy.least = smaller(E11, E22);
     energy.most = larger(E11, E22);
@@ -177,16 +174,11 @@ inline PointEnergy<Real> energy_hessian(const PointLaw& law, TangentKind kind, c
   PointEnergy<Real> work{};
   const Vec3<Real> zero{work.membrane, work.membrane, work.membrane};
   dg.x1 = dg.x2 = dg.x11 = dg.x22 = dg.x12 = zero;
-  if (law.membrane) {
-    Real S11 = 0.5 * law.weft * (dot(x.x1, x.x1) - 1.0), S22 = 0.5 * law.warp * (dot(x.x2, x.x2) - 1.0);
-    Real S12 = law.shear * dot(x.x1, x.x2);
-    Real dS11 = law.weft * dot(x.x1, dx.x1), dS22 = law.warp * dot(x.x2, dx.x2);
-    if (law.coupling != 0) {
-      const double half = 0.5 * law.coupling;
-      S11 = S11 + half * (dot(x.x2, x.x2) - 1.0), S22 = S22 + half * (dot(x.x1, x.x1) - 1.0);
-      dS11 = dS11 + law.coupling * dot(x.x2, dx.x2), dS22 = dS22 + law.coupling * dot(x.x1, dx.x1);
-    }
-    const Real dS12 = law.shear * (dot(x.x1, dx.x2) + dot(x.x2, dx.x1));
+  if (law.stretches) {
+    const Real E11 = 0.5 * (dot(x.x1, x.x1) - 1.0), E22 = 0.5 * (dot(x.x2, x.x2) - 1.0);
+    auto [S11, S22, S12] = membrane_stress(law.membrane, E11, E22, dot(x.x1, x.x2));
+    const auto [dS11, dS22, dS12] =
+        membrane_stress(law.membrane, dot(x.x1, dx.x1), dot(x.x2, dx.x2), dot(x.x1, dx.x2) + dot(x.x2, dx.x1));
     if (kind == TangentKind::upper) {
       // Positive part of the symmetric 2 x 2 stress: (f(a) - f(b)) / (a - b) and its companion with f = max(., 0).
       const Real mean = 0.5 * (S11 + S22), half = 0.5 * (S11 - S22), radius = sqrt(half * half + S12 * S12);

@@ -590,9 +590,8 @@ MaterialState ShellModel::state(int panel, double u, double v, const Eigen::Ref<
   }
   state.strain << 0.5 * (dot(x.x1, x.x1) - 1), 0.5 * (dot(x.x2, x.x2) - 1), dot(x.x1, x.x2);
   state.curvature << kappa.k11 - natural.k11, kappa.k22 - natural.k22, kappa.k12 - natural.k12;
-  const PointLaw& law = impl_->layouts[panel].law;
-  state.second_pk << law.weft * state.strain[0] + law.coupling * state.strain[1],
-      law.warp * state.strain[1] + law.coupling * state.strain[0], law.shear * state.strain[2];
+  const auto [S11, S22, S12] = membrane_stress(p.fabric.membrane, state.strain[0], state.strain[1], state.strain[2]);
+  state.second_pk << S11, S22, S12;
   state.nominal << std::sqrt(dot(x.x1, x.x1)) * state.second_pk[0], std::sqrt(dot(x.x2, x.x2)) * state.second_pk[1];
   return state;
 }

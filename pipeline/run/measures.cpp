@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "analysis/constraint/stress_recovery.h"
+#include "analysis/fabric/membrane_law.h"
 #include "pipeline/build/places.h"
 
 namespace toile {
@@ -108,9 +109,10 @@ double unseen_energy(const Build& build, const System& system, const Eigen::Vect
   }
   for (const StrainRow& row : system.projection->rows().strain) {
     const Fabric& fabric = model.panels()[static_cast<std::size_t>(row.panel)].fabric;
-    const double k = row.warp ? fabric.membrane.warp : fabric.membrane.weft,
-                 c = 0.5 * (apply(row.row, q).squaredNorm() - 1);
-    energy -= 0.5 * k * row.area * c * c;
+    const double c = 0.5 * (apply(row.row, q).squaredNorm() - 1);
+    const double along = row.warp ? membrane_stress(fabric.membrane, 0.0, c, 0.0).S22
+                                  : membrane_stress(fabric.membrane, c, 0.0, 0.0).S11;
+    energy -= 0.5 * along * row.area * c;
   }
   return energy;
 }

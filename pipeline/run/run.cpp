@@ -117,7 +117,7 @@ class Run::Impl {
     result_.watch.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
   }
 
-  // Nets that don't follow the threads lock where rows are stiff. (analysis/README.md, "Which rows")
+  // Nets that don't follow the threads lock where rows are stiff. (analysis/constraint/README.md, "Which rows")
   void warn_of_stiff_limit() {
     constexpr double much = 100;
     const StrainLimit& limit = scene_.strain_limit;

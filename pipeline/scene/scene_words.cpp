@@ -118,7 +118,7 @@ std::span<const KeyWords> scene_words() {
 
       {"load.gravity", "Gravity (default: [0, 0, -9.81])"},
       {"load.wind", "Velocity of the air (default: [0, 0, 0])"},
-      {"solver.model", "The model of the cloth"},
+      {"solver.model", "The model of the cloth; this version has one"},
       {"solver.scheme", "The time scheme: explicit, or implicit with steps of any size (default: verlet)"},
       {"solver.dt", "Time step, or \"auto\": 0.9 of the stable one (default: auto)"},
       {"solver.until", "Simulated time, or \"rest\": until static equilibrium (default: 1 s)"},

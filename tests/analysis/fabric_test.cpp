@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/fabric/membrane_law.h"
 #include "geometry/error.h"
 #include "support/near.h"
 
@@ -11,6 +12,17 @@ namespace toile {
 namespace {
 
 const Fabric::Bending law{.b0 = 3.3e-3, .kappa0 = 30, .kappa_reg = 0.03, .twist = 0};
+
+// Pulled one way, free sheets of the classical shell carry E t per strain and narrow by Poisson's ratio.
+TEST(MembraneStress, OfAnIsotropicSheetPulledOneWayIsYoungsModulusTimesThickness) {
+  const double E = 3e6, nu = 0.3, t = 0.002, strain = 0.01;
+  const Fabric::Membrane sheet = isotropic(E, nu, t).membrane;
+  const MembraneStress<double> along = membrane_stress(sheet, strain, -nu * strain, 0.0);
+  expect_near_rel(along.S11, E * t * strain, 1e-13);
+  expect_near_rel(along.S22, 0, 0, 1e-13 * E * t * strain);
+  const MembraneStress<double> sheared = membrane_stress(sheet, 0.0, 0.0, strain);
+  expect_near_rel(sheared.S12, E * t / (2 * (1 + nu)) * strain, 1e-13);
+}
 
 TEST(BendingResponse, MomentIsTheDerivativeOfTheEnergyAndSlopeThatOfTheMoment) {
   for (const double kappa : {-400.0, -31.0, -12.0, -0.1, -0.02, 0.0, 1e-3, 0.03, 0.7, 29.0, 35.0, 1000.0}) {
