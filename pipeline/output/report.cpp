@@ -85,7 +85,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["exit"] = name(run.exit);
   if (run.exit != RunExit::ok) report["reason"] = run.reason;
   report["model"] = "shell";
-  report["scheme"] = name(scene.scheme);
+  report["scheme"] = named_scheme(scene.scheme).name;
   report["panels"] = Json::array();
   for (const BuiltPanel& panel : build.panels) report["panels"].push_back(panel_json(panel));
   report["frames"] = run.frames;

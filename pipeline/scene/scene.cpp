@@ -11,6 +11,7 @@
 #include <limits>
 #include <numbers>
 
+#include "analysis/scheme/implicit.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "io/file.h"
@@ -573,12 +574,10 @@ void read_limit(Table table, Scene& scene) {
 
 void read_solver(Table table, Scene& scene) {
   table.choice("model", {"shell"}, {"hinge", "solid", "spring", "fem"});
-  constexpr TimeScheme schemes[] = {TimeScheme::verlet, TimeScheme::backward_euler, TimeScheme::bdf2,
-                                    TimeScheme::newmark};
   std::vector<std::string> names;
-  for (const TimeScheme scheme : schemes) names.emplace_back(name(scheme));
-  if (const auto scheme = table.choice("scheme", names, {}))
-    scene.scheme = schemes[std::ranges::find(names, *scheme) - names.begin()];
+  for (const NamedScheme& scheme : time_schemes()) names.emplace_back(scheme.name);
+  if (const auto word = table.choice("scheme", names, {}))
+    scene.scheme = time_schemes()[static_cast<std::size_t>(std::ranges::find(names, *word) - names.begin())].scheme;
   if (const toml::node* node = table.find("dt")) {
     if (!(node->is_string() && *node->value<std::string>() == "auto")) {
       scene.dt = table.quantity(*node, "dt in [solver]", dimension::time, Range::positive);
@@ -896,21 +895,21 @@ bool has_law(LimitSolver solver) {
 }
 
 bool implicit(const Scene& scene) {
-  return scene.scheme != TimeScheme::verlet || (scene.rest && scene.rest->method == RestMethod::newton);
+  return named_scheme(scene.scheme).rule || (scene.rest && scene.rest->method == RestMethod::newton);
 }
 
-const char* name(TimeScheme scheme) {
-  switch (scheme) {
-    case TimeScheme::verlet:
-      return "verlet";
-    case TimeScheme::backward_euler:
-      return "backward-euler";
-    case TimeScheme::bdf2:
-      return "bdf2";
-    case TimeScheme::newmark:
-      return "newmark";
-  }
-  return "";
+std::span<const NamedScheme> time_schemes() {
+  static constexpr NamedScheme schemes[] = {
+      {TimeScheme::verlet, "verlet", std::nullopt},
+      {TimeScheme::backward_euler, "backward-euler", ImplicitRule::backward_euler},
+      {TimeScheme::bdf2, "bdf2", ImplicitRule::bdf2},
+      {TimeScheme::newmark, "newmark", ImplicitRule::newmark},
+  };
+  return schemes;
+}
+
+const NamedScheme& named_scheme(TimeScheme scheme) {
+  return time_schemes()[static_cast<std::size_t>(scheme)];
 }
 
 }  // namespace toile

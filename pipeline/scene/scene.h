@@ -125,8 +125,16 @@ struct StrainLimit {
   double percentile = 99.9;  // of the rows' area that substeps are to keep within the limit
 };
 
+enum class ImplicitRule;  // analysis/scheme/implicit.h
 enum class TimeScheme { verlet, backward_euler, bdf2, newmark };
-const char* name(TimeScheme scheme);  // "backward-euler", as in scenes and reports
+struct NamedScheme {
+  TimeScheme scheme;
+  const char* name;                  // "backward-euler", as in scenes and reports
+  std::optional<ImplicitRule> rule;  // its steps are ImplicitScheme's; none: they are held to the stable step
+};
+// In the order of TimeScheme.
+std::span<const NamedScheme> time_schemes();
+const NamedScheme& named_scheme(TimeScheme scheme);
 
 // until = "rest": static equilibrium.
 enum class RestMethod { relaxation, newton };

@@ -280,5 +280,17 @@ TEST(Scene, FindingsOfTheFuzzerStayFixed) {
   EXPECT_GE(read, 1);
 }
 
+// Explicit schemes, verlet alone, are held to the stable step; equilibrium by Newton's method is not, whatever the
+// scheme.
+TEST(Scene, SchemesAreImplicitWhereTheyHaveARule) {
+  for (const NamedScheme& scheme : time_schemes()) {
+    const Scene read = parse(valid_lines(), {std::string("solver.scheme=") + scheme.name});
+    EXPECT_EQ(read.scheme, scheme.scheme) << scheme.name;
+    EXPECT_EQ(&named_scheme(scheme.scheme), &scheme) << scheme.name;
+    EXPECT_EQ(implicit(read), std::string(scheme.name) != "verlet") << scheme.name;
+  }
+  EXPECT_TRUE(implicit(parse(valid_lines(), {"solver.until=rest", "solver.rest.method=newton"})));
+}
+
 }  // namespace
 }  // namespace toile
