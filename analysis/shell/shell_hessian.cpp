@@ -178,7 +178,7 @@ void ShellModel::add_hessian(const Eigen::Ref<const Eigen::VectorXd>& q, Tangent
                              BlockMatrix& matrix, Workers* workers) const {
   assert(q.size() == rest().size());
   const std::vector<CellGroup>& groups = impl_->groups;
-  const int threads = workers && impl_->point_count >= least_points_for_threads ? workers->count() : 1;
+  const int threads = workers && impl_->point_count >= least_quadrature_points_for_threads ? workers->count() : 1;
   constexpr int groups_per_thread = 8;
   const std::size_t batch = static_cast<std::size_t>(threads == 1 ? 1 : groups_per_thread * threads);
   std::vector<LocalMatrix> local(batch);

@@ -277,7 +277,7 @@ PointEnergy<Lanes> ShellModel::Impl::subtract_images(double* out, Workers* worke
     total.least = smaller(total.least, part.least);
     total.most = larger(total.most, part.most);
   };
-  if (!workers || workers->count() < 2 || point_count < least_points_for_threads) {
+  if (!workers || workers->count() < 2 || point_count < least_quadrature_points_for_threads) {
     for_each_group([&](const CellGroup& group, const PanelLayout& layout, const LanePack* table) {
       LocalNet local;
       add(image(group, layout, table, local));

@@ -133,7 +133,7 @@ struct SharedWork {
 };
 
 // Below this many quadrature points starting the threads costs what they save. (analysis/shell/README.md, "Threads")
-inline constexpr std::size_t least_points_for_threads = 8000;
+inline constexpr std::size_t least_quadrature_points_for_threads = 8000;
 
 struct ShellModel::Impl {
   explicit Impl(Data& of) : data(of), panels(of.panels), first(of.first) {}

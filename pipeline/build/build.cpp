@@ -198,7 +198,7 @@ NurbsSurface start_surface(const PanelFile& file, const ScenePanel& panel, const
 
 struct PanelParts {
   BuiltPanel built;
-  ClothPanel shell;
+  ClothPanel panel;
   Eigen::Matrix3Xd start;
   AffineMap::Matrix dependence;
 };
@@ -250,7 +250,7 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule
     }
     parts.start = placed(start, unit, panel.place).points();
   }
-  parts.shell = {panel.name,
+  parts.panel = {panel.name,
                  std::move(extension.rest),
                  std::move(rule),
                  panel.fabric,
@@ -297,7 +297,7 @@ Build build(Scene scene) {
   result.read_seconds = since(reading);
 
   const Clock::time_point trimming = Clock::now();
-  std::vector<ClothPanel> shells;
+  std::vector<ClothPanel> panels;
   std::vector<Eigen::Triplet<double>> dependence;
   std::vector<Eigen::Matrix3Xd> starts;
   int count = 0;
@@ -311,7 +311,7 @@ Build build(Scene scene) {
     }
     count += static_cast<int>(parts.start.cols());
     starts.push_back(std::move(parts.start));
-    shells.push_back(std::move(parts.shell));
+    panels.push_back(std::move(parts.panel));
     result.panels.push_back(std::move(parts.built));
   }
   // A point that is held pulls hardest: strain is limited there too, wherever it lies in its cell.
@@ -325,7 +325,7 @@ Build build(Scene scene) {
   }
   result.dependence.resize(count, count);
   result.dependence.setFromTriplets(dependence.begin(), dependence.end());
-  result.model = std::make_unique<ShellModel>(std::move(shells));
+  result.model = std::make_unique<ShellModel>(std::move(panels));
   if (result.scene.strain_limit.on) {
     for (std::size_t k = 0; k < result.panels.size(); ++k) {
       BuiltPanel& panel = result.panels[k];

@@ -35,7 +35,7 @@ std::vector<Eigen::Vector2d> marks(const Address& at, const NurbsSurface& rest) 
 // stretch so far, from one to the other beside the straight line of the parameter plane. Infinite where that line
 // leaves the material.
 double reach(const Build& build, int panel, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-  const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
+  const ClothPanel& cloth = build.model->panels()[static_cast<std::size_t>(panel)];
   const BuiltPanel& built = build.panels[static_cast<std::size_t>(panel)];
   const StrainLimit& limit = build.scene.strain_limit;
   constexpr int parts = 32;
@@ -43,9 +43,9 @@ double reach(const Build& build, int panel, const Eigen::Vector2d& from, const E
   for (int k = 0; k < parts; ++k) {
     const Eigen::Vector2d step = (to - from) / parts, middle = from + (k + 0.5) * step;
     if (!in_material(built.face, built.topology, middle)) return std::numeric_limits<double>::infinity();
-    const SurfaceJet jet = evaluate(shell.rest, middle.x(), middle.y());
+    const SurfaceJet jet = evaluate(cloth.rest, middle.x(), middle.y());
     const Eigen::Vector3d normal = jet.u.cross(jet.v).normalized(), along = jet.u * step.x() + jet.v * step.y();
-    const Eigen::Vector3d weft = Eigen::AngleAxisd(shell.grain, normal) * *shell.straight_u;
+    const Eigen::Vector3d weft = Eigen::AngleAxisd(cloth.grain, normal) * *cloth.straight_u;
     const double weft_part = along.dot(weft), warp_part = (along - weft_part * weft).norm();
     sum +=
         std::abs(weft_part) * std::sqrt(1 + 2 * limit.weft.stretch) + warp_part * std::sqrt(1 + 2 * limit.warp.stretch);
@@ -64,14 +64,14 @@ void refuse_out_of_reach(const Build& build, double t, const MovedPoint& moved) 
       const ScenePin &p = scene.pins[a], &q = scene.pins[b];
       if (p.panel != q.panel || !(p.move || q.move) || p.partial() || q.partial()) continue;
       const int panel = build.panel(p.panel);
-      const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
-      if (!shell.straight_u) continue;
+      const ClothPanel& cloth = build.model->panels()[static_cast<std::size_t>(panel)];
+      if (!cloth.straight_u) continue;
       double end = std::max(p.move ? p.move->end : 0, q.move ? q.move->end : 0);
       for (const ScenePin* pin : {&p, &q}) end = std::min(end, pin->release.value_or(end));
       end = std::min(end, scene.until);
-      const NurbsSurface start = shell.rest.with_points(build.net(panel, build.start));
-      for (const Eigen::Vector2d& from : marks(p.at, shell.rest)) {
-        for (const Eigen::Vector2d& to : marks(q.at, shell.rest)) {
+      const NurbsSurface start = cloth.rest.with_points(build.net(panel, build.start));
+      for (const Eigen::Vector2d& from : marks(p.at, cloth.rest)) {
+        for (const Eigen::Vector2d& to : marks(q.at, cloth.rest)) {
           const double longest = reach(build, panel, from, to);
           for (int k = 1; k <= moments && t < end; ++k) {
             const double time = t + (end - t) * k / moments;

@@ -24,7 +24,7 @@ namespace toile {
 namespace {
 
 // Starting threads takes some microseconds: with fewer points a step by one is as fast.
-constexpr int least_points_for_threads = 2000;
+constexpr int least_control_points_for_threads = 2000;
 constexpr double rest_residual = 1e-7;  // of the loads
 
 // What is held on one side of a seam is held on the other.
@@ -152,12 +152,12 @@ double default_limit_stiffness(const Build& build, int panel) {
   const StrainLimit& limit = scene.strain_limit;
   // Substeps have no wall that takes over where loads gather.
   const double reserve = 10, share = limit.solver == LimitSolver::substeps ? 100 : 10;
-  const ClothPanel& shell = build.model->panels()[static_cast<std::size_t>(panel)];
-  double load = shell.fabric.density * scene.gravity.norm() * extent(shell);
+  const ClothPanel& cloth = build.model->panels()[static_cast<std::size_t>(panel)];
+  double load = cloth.fabric.density * scene.gravity.norm() * extent(cloth);
   for (const SceneTraction& traction : scene.tractions) load = std::max(load, traction.force.norm());
   const double narrowest = std::min({limit.weft.stretch, limit.weft.compress, limit.warp.stretch, limit.warp.compress});
-  const double own = std::max(shell.fabric.membrane.weft, shell.fabric.membrane.warp);
-  return std::max({share * load / narrowest, reserve * own, reserve * shell.fabric.density});
+  const double own = std::max(cloth.fabric.membrane.weft, cloth.fabric.membrane.warp);
+  return std::max({share * load / narrowest, reserve * own, reserve * cloth.fabric.density});
 }
 
 StepReport step(const System& system, DynamicState& state, double dt, StepWork& work) {
@@ -267,7 +267,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   MechanicalSystem& dynamic = system->dynamic;
   dynamic.body = build.model.get();
   dynamic.potentials = build.model->potentials();
-  if (build.model->point_count() >= least_points_for_threads) dynamic.workers = workers;
+  if (build.model->point_count() >= least_control_points_for_threads) dynamic.workers = workers;
   dynamic.map = system->map.get();
   dynamic.loads = build.loads;
   dynamic.node_mass = system->map->reduce_scalar(build.model->lumped_mass());
@@ -337,9 +337,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   }
   dynamic.projection = system->projection.get();
   if (implicit(scene)) {
-    const ImplicitRule rule = scene.scheme == TimeScheme::backward_euler ? ImplicitRule::backward_euler
-                              : scene.scheme == TimeScheme::bdf2         ? ImplicitRule::bdf2
-                                                                         : ImplicitRule::newmark;
+    const ImplicitRule rule = named_scheme(scene.scheme).rule.value_or(ImplicitRule::newmark);
     ImplicitOptions options;
     if (scene.rest) options.residual = rest_residual;
     system->implicit = std::make_unique<ImplicitScheme>(dynamic, limit_options(limit), rule, options);

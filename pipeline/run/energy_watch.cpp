@@ -15,8 +15,8 @@ constexpr double step_rise = 0.05, total_rise = 0.2, small_rise = 0.005;
 
 }  // namespace
 
-std::string judge(EnergyWatch& watch, const EnergyBalance& before, const StepReport& report, double dt_before,
-                  bool careful) {
+std::string why_refused(EnergyWatch& watch, const EnergyBalance& before, const StepReport& report, double dt_before,
+                        bool careful) {
   if (!report.finite) return "the numbers are no longer finite";
   const EnergyBalance& e = before;
   const double elastic = report.elastic.total() + report.limit_energy;

@@ -47,8 +47,8 @@ void fields(auto& archive, Like<EnergyWatch> auto& w) {
 //       %;
 //   (3) `careful`: by no more than half a percent since a step was last refused. For steps that follow a bound.
 // `dt_before`: of the step before [s]; a smaller step may seem to gain that step's kick.
-std::string judge(EnergyWatch& watch, const EnergyBalance& before, const StepReport& report, double dt_before,
-                  bool careful);
+std::string why_refused(EnergyWatch& watch, const EnergyBalance& before, const StepReport& report, double dt_before,
+                        bool careful);
 
 // The balance after an accepted step.
 void add_step(EnergyBalance& energy, const StepReport& report, const EnergyWatch& watch);

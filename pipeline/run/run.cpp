@@ -216,7 +216,7 @@ class Run::Impl {
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
       std::string trouble = unmet(report);
-      if (trouble.empty()) trouble = judge(result_.watch, result_.energy, report, result_.dt_last, careful());
+      if (trouble.empty()) trouble = why_refused(result_.watch, result_.energy, report, result_.dt_last, careful());
       if (trouble.empty()) {
         accept(report);
         if (scene_.rest) relax_after(report);

@@ -105,7 +105,7 @@ std::string judged(EnergyWatch& watch, double gained, bool careful, double dt = 
   report.dt = dt;
   report.kinetic = gained;
   report.elastic.energy.add("membrane", 1);
-  return judge(watch, before, report, 1e-3, careful);
+  return why_refused(watch, before, report, 1e-3, careful);
 }
 
 TEST(EnergyWatch, RefusesWhatNoWorkExplains) {
@@ -134,7 +134,7 @@ TEST(EnergyWatch, NumbersThatAreNotFiniteAreRefused) {
   StepReport report;
   report.finite = false;
   EnergyWatch watch;
-  EXPECT_NE(judge(watch, {}, report, 0, false).find("finite"), std::string::npos);
+  EXPECT_NE(why_refused(watch, {}, report, 0, false).find("finite"), std::string::npos);
 }
 
 Build hanging_sheet(const Folder& folder) {
