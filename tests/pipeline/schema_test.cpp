@@ -186,10 +186,11 @@ TEST(Schema, TakesTheFrameFormatsThatTheReaderTakes) {
     const std::string text = std::string("[[panel]]\nfile = \"/proc/version\"\n[output]\nformats = [\"") +
                              std::string(format.name) + "\"]\n";
     EXPECT_EQ(scenes.check(json_of(text, "scene.toml")).empty(), format.of_frames) << format.name;
-    if (format.of_frames)
+    if (format.of_frames) {
       EXPECT_EQ(parse_scene(text, "scene.toml").formats, std::vector{format.format});
-    else
+    } else {
       EXPECT_THROW(parse_scene(text, "scene.toml"), InputError) << format.name;
+    }
   }
 }
 
