@@ -11,6 +11,7 @@
 #include <set>
 
 #include "geometry/error.h"
+#include "geometry/mesh_repair.h"
 #include "geometry/triangle.h"
 #include "support/bodies.h"
 #include "support/near.h"
@@ -25,7 +26,6 @@ using test::box_mesh;
 using test::sphere_mesh;
 using test::spiky_mesh;
 using test::torus_mesh;
-using test::winding_number;
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
@@ -73,7 +73,7 @@ TEST(MeshObstacle, TheSignIsThatOfTheWindingNumber) {
     for (const Vector3d& p : places(mesh, random)) {
       const auto found = body.nearest(p, infinite);
       ASSERT_TRUE(found);
-      const double winding = winding_number(mesh, p);
+      const double winding = winding_number(mesh.vertices, mesh.triangles, p);
       if (std::abs(found->distance) < 1e-12) continue;
       EXPECT_EQ(found->distance<0, winding> 0.5) << p.transpose() << ": " << found->distance << ", " << winding;
       inside += winding > 0.5;

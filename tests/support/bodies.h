@@ -77,16 +77,4 @@ inline TriangleMesh torus_mesh(int n, int m, double large, double small) {
   return mesh;
 }
 
-// How often a mesh winds around a place: the sum of its triangles' solid angles (van Oosterom & Strackee 1983).
-inline double winding_number(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
-  double sum = 0;
-  for (const Triangle& t : mesh.triangles) {
-    const Eigen::Vector3d a = mesh.vertices.col(t[0]) - p, b = mesh.vertices.col(t[1]) - p,
-                          c = mesh.vertices.col(t[2]) - p;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    sum += std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return sum / (2 * std::numbers::pi);
-}
-
 }  // namespace toile::test
