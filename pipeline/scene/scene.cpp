@@ -3,26 +3,23 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "analysis/scheme/implicit.h"
 #include "geometry/error.h"
 #include "geometry/measure.h"
 #include "io/file.h"
 #include "io/panel_file.h"
+#include "pipeline/scene/readers.h"
 #include "pipeline/scene/toml_table.h"
 #include "pipeline/scene/units.h"
 
 namespace toile {
 namespace {
-
-constexpr double degree_in_radians = std::numbers::pi / 180;
 
 std::string stem_of(const std::string& name, std::string_view suffix) {
   return name.substr(0, name.size() - suffix.size());
@@ -125,14 +122,6 @@ void list_keys(const toml::node& node, const std::string& path,
   }
 }
 
-Placement read_placement(Table table) {
-  Placement place;
-  if (const auto v = table.vector<3>("translate", dimension::length)) place.translate = *v;
-  if (const auto v = table.vector<3>("rotate_deg", dimension::angle, degree_in_radians)) place.rotate = *v;
-  table.done();
-  return place;
-}
-
 Fabric read_fabric(Table table) {
   Fabric fabric;
   if (const auto base = table.string("like")) {
@@ -198,11 +187,6 @@ Fabric read_fabric(Table table) {
   }
   table.done();
   return fabric;
-}
-
-std::filesystem::path beside(const std::filesystem::path& scene, const std::string& file) {
-  const std::filesystem::path path(file);
-  return path.is_absolute() ? path : scene.parent_path() / path;
 }
 
 struct Fabrics {
@@ -292,23 +276,6 @@ Address address(Table& table, const std::string& key) {
   } catch (const InputError& error) {
     table.fail(*table.raw().get(key), error.what());
   }
-}
-
-PinMotion read_motion(Table& move) {
-  PinMotion motion;
-  if (const auto v = move.vector<3>("translate", dimension::length)) motion.translate = *v;
-  if (const auto v = move.vector<3>("rotate_deg", dimension::angle, degree_in_radians)) motion.rotate = *v;
-  motion.centre = move.vector<3>("centre", dimension::length);
-  move.number(motion.start, "start", dimension::time, Range::nonnegative);
-  const auto end = move.number("end", dimension::time, Range::positive);
-  if (!end) move.missing("end", "the time at which the motion is complete");
-  motion.end = *end;
-  if (!(motion.start < motion.end)) {
-    move.fail(*move.raw().get("end"),
-              fmt::format("end in move is {} s, must come after start = {} s", motion.end, motion.start));
-  }
-  move.done();
-  return motion;
 }
 
 ScenePin read_pin(Table table, const std::vector<ScenePanel>& panels) {
@@ -423,32 +390,6 @@ SceneSeam read_seam(Table table, const std::vector<ScenePanel>& panels) {
                                  curve, seam.a.panel));
   }
   return seam;
-}
-
-SceneObstacle read_obstacle(Table table, const std::filesystem::path& scene) {
-  SceneObstacle obstacle;
-  obstacle.where = table.where();
-  const auto mesh = table.string("mesh");
-  if (!mesh) table.missing("mesh", "a file of triangles, relative to the scene");
-  obstacle.mesh = beside(scene, *mesh);
-  std::error_code error;
-  if (!std::filesystem::exists(obstacle.mesh, error)) {
-    table.fail(*table.raw().get("mesh"), fmt::format("mesh '{}' does not exist", obstacle.mesh.string()));
-  }
-  if (const auto unit = table.string("unit")) {
-    try {
-      obstacle.metres_per_unit = parse_quantity("1 " + *unit, dimension::length);
-    } catch (const InputError&) {
-      table.fail(*table.raw().get("unit"),
-                 fmt::format("unit is \"{}\", must be a length unit such as \"m\" or \"cm\"", *unit));
-    }
-  }
-  if (auto place = table.table("place", "place")) obstacle.place = read_placement(*place);
-  table.number(obstacle.friction, "friction", dimension::none, Range::nonnegative);
-  table.number(obstacle.thickness, "thickness", dimension::length, Range::nonnegative);
-  if (auto move = table.table("move", "move")) obstacle.move = read_motion(*move);
-  table.done();
-  return obstacle;
 }
 
 FileFormat frame_format(Table& table, const toml::node& entry) {
@@ -674,9 +615,6 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   scene.path = path;
   scene.name = scene_name(path);
   Table top(root, "the scene", path.string());
-  top.refuse("contact_pair",
-             "[[contact_pair]] is not supported by this version, which drapes panels with pins, "
-             "tractions, gravity and wind");
   Fabrics fabrics;
   if (auto table = top.table("fabric", "[fabric]")) {
     for (const auto& [name, node] : table->raw()) {
@@ -705,7 +643,8 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   }
   for (Table& table : top.tables("force", "[[force]]")) scene.forces.push_back(read_force(table, scene.panels));
   for (Table& table : top.tables("seam", "[[seam]]")) scene.seams.push_back(read_seam(table, scene.panels));
-  for (Table& table : top.tables("obstacle", "[[obstacle]]")) scene.obstacles.push_back(read_obstacle(table, path));
+  read_obstacles(top, scene);
+  read_contact_pairs(top, scene);
   read_settings(top, scene);
   snap_releases(scene);
   require_pins_for_rest(scene);
@@ -715,23 +654,6 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
 }
 
 }  // namespace
-
-Eigen::Matrix3d Placement::rotation() const {
-  using Eigen::AngleAxisd;
-  using Eigen::Vector3d;
-  if (rotate.isZero(0)) return Eigen::Matrix3d::Identity();
-  return (AngleAxisd(rotate[2], Vector3d::UnitZ()) * AngleAxisd(rotate[1], Vector3d::UnitY()) *
-          AngleAxisd(rotate[0], Vector3d::UnitX()))
-      .toRotationMatrix();
-}
-
-Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& mean, double t) const {
-  const double tau = std::clamp((t - start) / (end - start), 0.0, 1.0);
-  if (tau == 0) return x;
-  const double s = tau * tau * tau * (10 + tau * (-15 + 6 * tau));
-  const Eigen::Vector3d c = centre.value_or(mean);
-  return c + Placement{{0, 0, 0}, s * rotate}.rotation() * (x - c) + s * translate;
-}
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
   toml::table root = parse_toml(text, path);

@@ -18,15 +18,10 @@
 #include "io/iges.h"
 #include "io/panel_file.h"
 #include "pipeline/scene/addresses.h"
+#include "pipeline/scene/placement.h"
+#include "pipeline/scene/scene_obstacle.h"
 
 namespace toile {
-
-// x -> translate + R x; R turns about the x, then the y, then the z axis of the scene.
-struct Placement {
-  Eigen::Vector3d translate{0, 0, 0};  // m
-  Eigen::Vector3d rotate{0, 0, 0};     // rad
-  Eigen::Matrix3d rotation() const;
-};
 
 struct ScenePanel {
   std::string name;                  // a face of the file by its name, else by its order
@@ -43,16 +38,6 @@ struct ScenePanel {
   Fabric fabric;
   std::string fabric_name;
   std::string where;  // "scene.toml:12", for messages
-};
-
-// Smooth motion of what a pin holds: the rigid motion (turn about centre, then translate) is scaled by a quintic that
-// rises from 0 to 1 between start and end with velocity and acceleration 0 at both.
-struct PinMotion {
-  Eigen::Vector3d translate{0, 0, 0};     // m
-  Eigen::Vector3d rotate{0, 0, 0};        // rad, about x, then y, then z
-  std::optional<Eigen::Vector3d> centre;  // m; unset: mean of the held points
-  double start = 0, end = 1;              // s
-  Eigen::Vector3d operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& mean, double t) const;
 };
 
 struct ScenePin {
@@ -92,15 +77,6 @@ struct SeamSide {
 // Read and checked; not simulated yet.
 struct SceneSeam {
   SeamSide a, b;
-  std::string where;
-};
-struct SceneObstacle {
-  std::filesystem::path mesh;
-  double metres_per_unit = 1;
-  Placement place;
-  double friction = 0.3;
-  double thickness = 0;  // m
-  std::optional<PinMotion> move;
   std::string where;
 };
 
@@ -170,6 +146,7 @@ struct Scene {
   std::vector<SceneForce> forces;
   std::vector<SceneSeam> seams;
   std::vector<SceneObstacle> obstacles;
+  std::vector<SceneContactPair> contact_pairs;
   StrainLimit strain_limit;
   Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
   Eigen::Vector3d wind{0, 0, 0};         // m/s

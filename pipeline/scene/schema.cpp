@@ -36,9 +36,32 @@ force = [0, 0, 1]
 a = {{ curve = 0 }}
 b = {{ curve = 1 }}
 [[obstacle]]
+name = "body"
 mesh = "{0}"
+morph = {{ to = "{0}", end = 1 }}
 place = {{}}
 move = {{ end = 1 }}
+[[obstacle]]
+shape = "plane"
+point = [0, 0, 0]
+normal = [0, 0, 1]
+[[obstacle]]
+shape = "sphere"
+centre = [0, 0, 0]
+radius = 1
+[[obstacle]]
+shape = "capsule"
+from = [0, 0, 0]
+to = [0, 0, 1]
+radius = 1
+[[obstacle]]
+shape = "box"
+centre = [0, 0, 0]
+size = [1, 1, 1]
+[[contact_pair]]
+a = "a"
+b = "body"
+friction = 0.3
 [strain_limit]
 {1}
 [load]
@@ -62,7 +85,10 @@ std::map<std::string, Json> scene_values() {
   const auto time_or = [](const char* word) {
     return Json{{"anyOf", {{{"const", word}}, schema_of_quantity(dimension::time, Range::positive)}}};
   };
+  const auto several = [](const Json& entry) { return Json{{"type", "array"}, {"items", entry}, {"minItems", 2}}; };
   return {
+      {"obstacle.sequence", several({{"type", "string"}})},
+      {"obstacle.times", several(schema_of_quantity(dimension::time, Range::any))},
       {"solver.dt", time_or("auto")},
       {"solver.until", time_or("rest")},
       {"output.formats", {{"type", "array"}, {"items", {{"enum", frame_format_names()}}}}},

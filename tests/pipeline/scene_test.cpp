@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <numbers>
 #include <string>
@@ -137,7 +138,7 @@ TEST(Scene, SeamsAndObstaclesAreReadAndChecked) {
   expect_message(1, top("seam = [{ a = { curve = 1, revers = true } }]"), {"unknown key 'revers'", "reverse"});
   expect_message(1, top("seam = [{ a = { panel = \"clothh\", curve = 1 } }]"), {"no panel is called 'clothh'"});
   expect_message(1, top("seam = [{ a = { curve = 1 }, b = { loop = 0, curve = 1 } }]"), {"with itself"});
-  expect_message(1, top("obstacle = [{}]"), {"[[obstacle]] needs mesh"});
+  expect_message(1, top("obstacle = [{}]"), {"[[obstacle]] needs mesh", "shape = \"plane\""});
   expect_message(1, top("obstacle = [{ mesh = \"nobody.obj\" }]"), {"nobody.obj", "does not exist"});
   expect_message(1, top("obstacle = [{ mesh = \"scene.toml\", unit = \"kg\" }]"), {"must be a length unit"});
   std::vector<std::string> lines = valid_lines();
@@ -150,6 +151,93 @@ TEST(Scene, SeamsAndObstaclesAreReadAndChecked) {
   EXPECT_TRUE(scene.seams[0].b.reverse);
   ASSERT_EQ(scene.obstacles.size(), 1u);
   EXPECT_EQ(scene.obstacles[0].metres_per_unit, 0.01);
+}
+
+// The scene with these tables before its panel.
+Scene with_tables(const std::string& tables) {
+  std::vector<std::string> lines = valid_lines();
+  lines[0] = tables + "\n[[panel]]";
+  return parse(lines);
+}
+
+TEST(Scene, ObstaclesAreMeshesSequencesOrShapes) {
+  const Scene scene = with_tables(
+      "obstacle = [{ mesh = \"scene.toml\", up = \"y\", morph = { to = \"square.igs\", start = 1, end = \"2 s\" } },"
+      "{ name = \"walker\", sequence = [\"scene.toml\", \"square.igs\"], times = [0, \"500 ms\"], unit = \"mm\" },"
+      "{ mesh = \"square.igs\" },"
+      "{ name = \"floor\", shape = \"plane\", point = [0, 0, \"-5 cm\"], normal = [0, 3, 4] },"
+      "{ shape = \"capsule\", from = [0, 0, 0], to = [0, 0, 1], radius = \"8 cm\", thickness = \"1 mm\" },"
+      "{ shape = \"box\", centre = [0, 0, 1], size = [1, 2, 3], place = { rotate_deg = [0, 0, 90] } }]\n"
+      "contact_pair = [{ a = \"cloth\", b = \"floor\", friction = 0.7 }, { a = \"cloth\", b = \"cloth\", friction = 0 "
+      "}]");
+  ASSERT_EQ(scene.obstacles.size(), 6u);
+  const SceneObstacle &morph = scene.obstacles[0], &walker = scene.obstacles[1], &iges = scene.obstacles[2],
+                      &plane = scene.obstacles[3], &capsule = scene.obstacles[4], &box = scene.obstacles[5];
+  EXPECT_EQ(morph.name, "obstacle_1");
+  EXPECT_EQ(morph.up, 'y');
+  EXPECT_EQ(morph.morph->end, 2);
+  EXPECT_EQ(morph.thickness, 0.003);
+  EXPECT_EQ(walker.sequence.size(), 2u);
+  EXPECT_EQ(walker.mesh, walker.sequence[0]);
+  EXPECT_EQ(walker.times, (std::vector{0, 0.5}));
+  EXPECT_EQ(walker.metres_per_unit, 0.001);
+  EXPECT_EQ(iges.chord_error, 0.00025);
+  EXPECT_EQ(plane.kind, ObstacleKind::plane);
+  EXPECT_EQ(plane.point, Eigen::Vector3d(0, 0, -0.05));
+  EXPECT_EQ(plane.normal, Eigen::Vector3d(0, 0.6, 0.8));
+  EXPECT_EQ(plane.thickness, 0);
+  EXPECT_EQ(capsule.kind, ObstacleKind::capsule);
+  EXPECT_EQ(capsule.radius, 0.08);
+  EXPECT_EQ(capsule.thickness, 0.001);
+  EXPECT_EQ(box.kind, ObstacleKind::box);
+  ASSERT_EQ(scene.contact_pairs.size(), 2u);
+  EXPECT_EQ(scene.contact_pairs[0].friction, 0.7);
+  // The thickness that nobody chose is said, once for each body.
+  EXPECT_EQ(std::ranges::count_if(scene.notes, [](const std::string& n) { return n.find("keeps 3 mm") != n.npos; }), 3);
+}
+
+TEST(Scene, ObstaclesThatMakeNoSenseAreRefused) {
+  const auto expect_refused = [](const std::string& tables, const std::string& words) {
+    try {
+      with_tables(tables);
+      ADD_FAILURE() << tables << " was accepted";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  };
+  const auto obstacle = [](const std::string& keys) { return "obstacle = [{ " + keys + " }]"; };
+  const std::string mesh = "mesh = \"scene.toml\"", plane = "shape = \"plane\", point = [0, 0, 0], normal = ";
+  expect_refused(obstacle(mesh + ", shape = \"plane\""), "one of mesh, sequence and shape");
+  expect_refused(obstacle("shape = \"sfere\""), "did you mean 'sphere'");
+  expect_refused(obstacle("shape = \"sphere\", centre = [0, 0, 0]"), "needs radius");
+  expect_refused(obstacle("shape = \"sphere\", centre = [0, 0, 0], radius = 0"), "must be positive");
+  expect_refused(obstacle("shape = \"sphere\", centre = [0, 0, 0], radius = 1, unit = \"mm\""),
+                 "unit belongs to a mesh");
+  expect_refused(obstacle(plane + "[0, 0, 0]"), "must not be zero");
+  expect_refused(obstacle(plane + "[0, 0, nan]"), "must be finite");
+  expect_refused(obstacle(plane + "[0, 0, 1], radius = 2"), "unknown key 'radius'");
+  expect_refused(obstacle("shape = \"cylinder\", radius = 1, from = [1, 0, 0], to = [1, 0, 0]"),
+                 "the axis needs a length");
+  expect_refused(obstacle("shape = \"box\", centre = [1, 0, 0], size = [1, 0, 1]"), "three lengths above 0");
+  expect_refused(obstacle(mesh + ", up = \"x\""), "unknown up");
+  expect_refused(obstacle(mesh + ", chord_error = 1"), "belongs to IGES bodies");
+  expect_refused(obstacle("mesh = \"square.igs\", unit = \"mm\""), "an IGES file says its own");
+  expect_refused(obstacle("sequence = [\"scene.toml\"]"), "two mesh files or more");
+  expect_refused(obstacle("sequence = [\"scene.toml\", \"nobody.obj\"], times = [0, 1]"), "nobody.obj' does not exist");
+  expect_refused(obstacle("sequence = [\"scene.toml\", \"scene.toml\"]"), "as many times");
+  expect_refused(obstacle("sequence = [\"scene.toml\", \"scene.toml\"], times = [1, 1]"), "must ascend");
+  expect_refused(obstacle(mesh + ", times = [1, 1]"), "belong to sequence");
+  expect_refused(obstacle(mesh + ", morph = { to = \"scene.toml\" }"), "needs end");
+  expect_refused(obstacle(mesh + ", morph = { to = \"scene.toml\", start = 2, end = 1 }"), "must come after start");
+  expect_refused(obstacle(mesh + ", name = \"cloth\""), "is called 'cloth'");
+  const std::string floor = obstacle("name = \"floor\", " + plane + "[0, 0, 1]") + "\n";
+  expect_refused(floor + "contact_pair = [{ a = \"cloth\", b = \"flor\", friction = 1 }]", "did you mean 'floor'");
+  expect_refused(floor + "contact_pair = [{ a = \"cloth\", b = \"floor\" }]", "needs friction");
+  expect_refused(floor + "contact_pair = [{ a = \"floor\", b = \"floor\", friction = 1 }]", "must be a panel");
+  expect_refused(floor +
+                     "contact_pair = [{ a = \"cloth\", b = \"floor\", friction = 1 }, { a = \"floor\", b = "
+                     "\"cloth\", friction = 1 }]",
+                 "are a pair already");
 }
 
 TEST(Scene, ABandNamesWhatItNeeds) {
@@ -184,7 +272,6 @@ TEST(Scene, LaterFeaturesAreRefusedByName) {
   expect_message(11, "solver = \"springs\"", {"not supported by this version", "projection", "lagrange"});
   expect_message(15, "model = \"hinge\"", {"not supported by this version", "shell"});
   expect_message(15, "scheme = \"newmarc\"", {"unknown scheme", "newmark"});
-  expect_message(12, "[[contact_pair]]", {"[[contact_pair]] is not supported by this version"});
 }
 
 TEST(Scene, BrokenTomlNamesItsLine) {
