@@ -24,9 +24,9 @@ using Eigen::Vector3d;
 
 // Vertices nearer than this are one, as a share of the mesh's size: some ten steps of the single precision that most
 // files have.
-constexpr double merged = 1e-6;
+constexpr double merging_share = 1e-6;
 // A triangle lower than this has no area, as a share of the size.
-constexpr double flat = 1e-9;
+constexpr double flat_share = 1e-9;
 
 std::string at(const Vector3d& x) {
   const auto short_text = [](double value) { return text(std::round(value * 1e6) / 1e6 + 0.0); };
@@ -86,7 +86,7 @@ void Repair::require_numbers() {
 
 // The lowest number within reach stands for a place.
 void Repair::merge_vertices() {
-  const double near = merged * size, cell = 4 * near;
+  const double near = merging_share * size, cell = 4 * near;
   std::map<std::array<std::int64_t, 3>, std::vector<int>> cells;
   const auto range = [&](double x) {
     return std::pair(static_cast<std::int64_t>(std::floor((x - near) / cell)),
@@ -193,7 +193,7 @@ void Repair::flip_flat() {
   for (int pass = 0; pass <= most_passes; ++pass) {
     std::vector<int> bad;
     for (int f = 0; f < static_cast<int>(triangles().size()); ++f)
-      if (height(triangles()[f]) <= flat * size) bad.push_back(f);
+      if (height(triangles()[f]) <= flat_share * size) bad.push_back(f);
     if (bad.empty()) break;
     if (gone == 0) first = middle(triangles()[bad[0]]);
     const MeshTopology top = topology();

@@ -18,6 +18,7 @@
 #include "pipeline/base/json_text.h"
 #include "pipeline/base/version.h"
 #include "pipeline/build/build.h"
+#include "pipeline/build/obstacles.h"
 #include "pipeline/output/history.h"
 #include "pipeline/output/output.h"
 #include "pipeline/output/summary.h"
@@ -81,6 +82,7 @@ std::vector<std::string> not_simulated(const Scene& scene) {
   };
   add(scene.seams, "seam", "seams");
   add(scene.obstacles, "obstacle", "obstacles");
+  add(scene.contact_pairs, "contact_pair", "contact pairs");
   return out;
 }
 
@@ -348,32 +350,53 @@ int dry_run(Scene scene, bool json, Console& console) {
   return exit_ok;
 }
 
+namespace {
+
+void tell(const ObstacleCheck& obstacles, Console& console) {
+  for (const std::string& about : obstacles.about) fmt::print("{}\n", about);
+  for (const std::string& note : obstacles.notes) console.note(note);
+  for (const std::string& warning : obstacles.warnings) console.warning(warning);
+  for (const std::string& fault : obstacles.faults) console.error(fault);
+}
+
+std::vector<std::string> joined(std::vector<std::string> first, const std::vector<std::string>& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
+}  // namespace
+
 int check_scene(Scene scene, bool json, Console& console) {
+  const ObstacleCheck obstacles = check_obstacles(scene);
+  if (!json) tell(obstacles, console);
   const Build built = build(std::move(scene));
   const std::unique_ptr<System> system = assemble(built, 0);
   const std::vector<std::string> idle = not_simulated(built.scene);
+  const bool valid = idle.empty() && obstacles.faults.empty();
   if (json) {
     nlohmann::ordered_json out;
     out["scene"] = built.scene.name;
-    out["valid"] = idle.empty();
+    out["valid"] = valid;
     out["panels"] = nlohmann::ordered_json::array();
     for (const BuiltPanel& panel : built.panels) {
       out["panels"].push_back({{"name", panel.name},
                                {"control_points", {panel.face.surface.count_u(), panel.face.surface.count_v()}},
                                {"constraint_points", panel.points.size()}});
     }
-    out["warnings"] = built.warnings;
-    out["notes"] = built.notes;
+    out["obstacles"] = obstacles.about;
+    out["errors"] = obstacles.faults;
+    out["warnings"] = joined(obstacles.warnings, built.warnings);
+    out["notes"] = joined(obstacles.notes, built.notes);
     out["not_simulated"] = idle;
     fmt::print("{}\n", json_text(out));
-    return idle.empty() ? exit_ok : exit_input;
+    return valid ? exit_ok : exit_input;
   }
   for (const std::string& warning : built.warnings) console.warning(warning);
   for (const std::string& note : built.notes) console.detail(note);
   for (std::size_t k = 0; k < built.panels.size(); ++k) fmt::print("{}\n", describe(built, k));
   // What `drape` refuses isn't valid.
   for (const std::string& reason : idle) console.error(reason);
-  if (!idle.empty()) return exit_input;
+  if (!valid) return exit_input;
   fmt::print("{}: valid\n", built.scene.path.string());
   return exit_ok;
 }

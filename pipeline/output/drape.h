@@ -30,7 +30,7 @@ int drape(Scene scene, const DrapeOptions& options, Console& console);
 // constraint rows that aren't used and why. Writes nothing.
 int dry_run(Scene scene, bool json, Console& console);
 
-// Builds the scene, pins and loads included, and lists its panels.
+// Builds the scene, pins and loads included, reads and checks every obstacle, and lists panels and obstacles.
 int check_scene(Scene scene, bool json, Console& console);
 
 }  // namespace toile

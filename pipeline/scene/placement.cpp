@@ -12,7 +12,7 @@ namespace toile {
 namespace {
 
 // The part of a motion that is done.
-double share(const PinMotion& motion, double t) {
+double done_share(const PinMotion& motion, double t) {
   const double tau = std::clamp((t - motion.start) / (motion.end - motion.start), 0.0, 1.0);
   return tau * tau * tau * (10 + tau * (-15 + 6 * tau));
 }
@@ -29,7 +29,7 @@ Eigen::Matrix3d Placement::rotation() const {
 }
 
 Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vector3d& mean, double t) const {
-  const double s = share(*this, t);
+  const double s = done_share(*this, t);
   if (s == 0) return x;
   const Eigen::Vector3d c = centre.value_or(mean);
   return c + Placement{{0, 0, 0}, s * rotate}.rotation() * (x - c) + s * translate;
@@ -37,7 +37,7 @@ Eigen::Vector3d PinMotion::operator()(const Eigen::Vector3d& x, const Eigen::Vec
 
 Eigen::Isometry3d PinMotion::at(double t, const Eigen::Vector3d& mean) const {
   Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
-  const double s = share(*this, t);
+  const double s = done_share(*this, t);
   const Eigen::Vector3d c = centre.value_or(mean);
   out.linear() = Placement{{0, 0, 0}, s * rotate}.rotation();
   out.translation() = c - out.linear() * c + s * translate;

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pipeline/build/iges_body.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "geometry/error.h"
+#include "geometry/mesh_joining.h"
+#include "io/panel_file.h"
+#include "trimming/face_triangles.h"
+#include "trimming/loops.h"
+
+namespace toile {
+
+IgesBody read_iges_body(const std::filesystem::path& path, double chord_error) {
+  const PanelFile file = read_panels(path);
+  IgesBody out;
+  out.metres_per_unit = file.metres_per_unit;
+  out.warnings = file.warnings;
+  for (const std::string& reason : file.refused) out.warnings.push_back("left out: " + reason);
+  // Half for the faces; neighbours may be as far apart as the other half where they are joined.
+  const double half = 0.5 * chord_error / file.metres_per_unit;
+  std::vector<Eigen::Vector3d> vertices;
+  std::string first_reason;
+  for (TrimmedSurface face : file.panels) {
+    try {
+      validate_loops(face);
+      const FaceTriangles triangles = face_triangles(face, half);
+      if (triangles.chord_error > half)
+        out.warnings.push_back(fmt::format("face '{}' ({}): its triangles are up to {:.3g} mm off, more than asked for",
+                                           face.name, face.source,
+                                           1000 * file.metres_per_unit * triangles.chord_error));
+      const int first = static_cast<int>(vertices.size());
+      for (Eigen::Index k = 0; k < triangles.mesh.vertices.cols(); ++k)
+        vertices.emplace_back(triangles.mesh.vertices.col(k));
+      for (const Triangle& t : triangles.mesh.triangles)
+        out.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    } catch (const GeometryError& error) {
+      if (first_reason.empty()) first_reason = error.what();
+      out.warnings.push_back(fmt::format("a face is left out: {}", error.what()));
+    }
+  }
+  if (vertices.empty())
+    throw GeometryError(first_reason.empty() ? path.string() + ": holds no face and no surface" : first_reason);
+  out.mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
+  for (std::size_t k = 0; k < vertices.size(); ++k) out.mesh.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
+  out.mesh = join_borders(std::move(out.mesh), std::max(half, 2 * file.resolution));
+  return out;
+}
+
+}  // namespace toile

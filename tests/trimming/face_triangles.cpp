@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "trimming/face_triangles.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+
+#include "geometry/error.h"
+#include "geometry/nurbs_surface.h"
+#include "trimming/loops.h"
+
+namespace toile {
+namespace {
+
+using Eigen::Vector3d;
+
+// A quarter of a cylinder of radius 1 and height 2, exact.
+TrimmedSurface quarter_cylinder() {
+  Eigen::Matrix3Xd net(3, 6);
+  net << 1, 1, 0, 1, 1, 0,  //
+      0, 1, 1, 0, 1, 1,     //
+      0, 0, 0, 2, 2, 2;
+  const double w = std::sqrt(0.5);
+  TrimmedSurface face =
+      untrimmed(NurbsSurface(KnotVector(2, {0, 0, 0, 1, 1, 1}), KnotVector(1, {0, 0, 1, 1}), net, {1, w, 1, 1, w, 1}));
+  validate_loops(face);
+  return face;
+}
+
+double area(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vector3d a = mesh.vertices.col(t[0]), b = mesh.vertices.col(t[1]), c = mesh.vertices.col(t[2]);
+    sum += 0.5 * (b - a).cross(c - a).norm();
+  }
+  return sum;
+}
+
+// A chord of error e spans 2 sqrt(2 e) of a unit circle: triangles that are much smaller would be a waste.
+TEST(FaceTriangles, MeetTheChordErrorWithoutWaste) {
+  const TrimmedSurface face = quarter_cylinder();
+  for (const double error : {1e-2, 1e-3}) {
+    SCOPED_TRACE(error);
+    const FaceTriangles found = face_triangles(face, error);
+    EXPECT_LE(found.chord_error, error);
+    for (const Triangle& t : found.mesh.triangles) {
+      Vector3d middle = Vector3d::Zero();
+      for (int k = 0; k < 3; ++k) {
+        const Vector3d a = found.mesh.vertices.col(t[k]), b = found.mesh.vertices.col(t[(k + 1) % 3]);
+        EXPECT_NEAR(a.head<2>().norm(), 1, 1e-12);
+        EXPECT_GE((0.5 * (a + b)).head<2>().norm(), 1 - error);
+        middle += a / 3;
+      }
+      EXPECT_GE(middle.head<2>().norm(), 1 - error);
+    }
+    const double exact = std::acos(-1.0);  // pi / 2 times 2
+    EXPECT_NEAR(area(found.mesh), exact, exact * error);
+    const double longest = 2 * std::sqrt(2 * error);
+    EXPECT_LT(static_cast<double>(found.mesh.triangles.size()), 40 * exact / (longest * longest));
+  }
+}
+
+TEST(FaceTriangles, AFlatFaceNeedsFew) {
+  Eigen::Matrix3Xd net(3, 4);
+  net << 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0;
+  TrimmedSurface face = untrimmed(NurbsSurface(KnotVector(1, {0, 0, 1, 1}), KnotVector(1, {0, 0, 1, 1}), net));
+  validate_loops(face);
+  const FaceTriangles found = face_triangles(face, 1e-6);
+  EXPECT_LT(found.chord_error, 1e-15);
+  EXPECT_LT(found.mesh.triangles.size(), 200u);
+  EXPECT_NEAR(area(found.mesh), 1, 1e-14);
+  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW(face_triangles(face, bad), GeometryError);
+}
+
+}  // namespace
+}  // namespace toile
