@@ -59,7 +59,7 @@ struct Repair {
   void drop_twins();
   void turn_minorities();
   void flip_flat();
-  std::map<std::pair<int, int>, int> partners(const MeshTopology& topology) const;
+  std::map<std::pair<int, int>, int> partners(const MeshTopology& topology);
   void part_sheets();
   void turn_outwards();
   void tell_holes();
@@ -144,7 +144,8 @@ void Repair::drop_twins() {
   if (triangles().empty()) throw GeometryError("no triangle of the mesh has an area");
 }
 
-// Over edges with two faces; of each part the fewer are turned.
+// Over edges with two faces; of each part the fewer are turned. Where a part can't be turned to one side, partners()
+// cuts it.
 void Repair::turn_minorities() {
   const MeshTopology top = topology();
   const int count = static_cast<int>(triangles().size());
@@ -164,9 +165,6 @@ void Repair::turn_minorities() {
         if (sign[other] == 0) {
           sign[other] = should;
           part.push_back(other);
-        } else if (sign[other] != should) {
-          throw GeometryError("the surface has one side only, as a band with a half twist, at " +
-                              at(vertex(top.edge(e)[0])) + ": cut it there");
         }
       }
     const auto against = std::ranges::count_if(part, [&](int f) { return sign[f] < 0; });
@@ -231,42 +229,45 @@ void Repair::flip_flat() {
   say(gone, "triangle", "with all corners on one line joined with a neighbour", first);
 }
 
-// Of each face and edge the face that goes on there; -1 at a border. Around an edge with more than two faces those are
-// neighbours that have the inside of the body between them.
-std::map<std::pair<int, int>, int> Repair::partners(const MeshTopology& top) const {
-  std::map<std::pair<int, int>, int> out_;
+// Of each face and edge the face that goes on there. Around an edge with more than two faces those are neighbours that
+// have the inside of the body between them.
+std::map<std::pair<int, int>, int> Repair::partners(const MeshTopology& top) {
+  std::map<std::pair<int, int>, int> of;
+  std::size_t cuts = 0;
+  std::string first;
   for (int e = 0; e < top.edge_count(); ++e) {
     const auto faces = top.faces_of_edge(e);
-    if (faces.size() <= 2) {
-      for (std::size_t k = 0; k < faces.size(); ++k) out_[{faces[k], e}] = faces.size() == 2 ? faces[1 - k] : -1;
-      continue;
-    }
+    if (faces.size() < 2) continue;
     const auto [a, b] = top.edge(e);
     const Vector3d d = (vertex(b) - vertex(a)).normalized();
     const Vector3d x = d.unitOrthogonal(), y = d.cross(x);
     std::vector<std::pair<double, int>> around;
     for (const int f : faces) {
-      const Triangle& t = out.mesh.triangles[f];
-      const int c = *std::ranges::find_if(t, [a = a, b = b](int v) { return v != a && v != b; });
+      const Triangle& t = triangles()[f];
+      const int c = *std::ranges::find_if(t, [v = a, w = b](int k) { return k != v && k != w; });
       const Vector3d w = vertex(c) - vertex(a);
       around.emplace_back(std::atan2(y.dot(w), x.dot(w)), f);
     }
     std::ranges::sort(around);
     // A face that runs against the edge has the inside after it, the other kind before.
-    const std::size_t n = around.size();
-    const std::size_t first = top.runs_along(around[0].second, e) ? 1 : 0;
-    for (std::size_t k = first; k < first + n; k += 2) {
+    const std::size_t n = around.size(), start = top.runs_along(around[0].second, e) ? 1 : 0;
+    bool alternate = n % 2 == 0;
+    for (std::size_t k = 0; k < n; ++k)
+      alternate = alternate && top.runs_along(around[(start + k) % n].second, e) == (k % 2 == 1);
+    if (!alternate) {
+      if (cuts++ == 0) first = std::to_string(n) + " meet from " + at(vertex(a)) + " to " + at(vertex(b));
+      continue;
+    }
+    for (std::size_t k = start; k < start + n; k += 2) {
       const int f = around[k % n].second, g = around[(k + 1) % n].second;
-      if (n % 2 == 1 || top.runs_along(f, e) || !top.runs_along(g, e))
-        throw GeometryError(std::to_string(n) + " triangles meet in the edge from " + at(vertex(a)) + " to " +
-                            at(vertex(b)) +
-                            " without an inside between them: take out those that aren't the "
-                            "body's surface");
-      out_[{f, e}] = g;
-      out_[{g, e}] = f;
+      of[{f, e}] = g;
+      of[{g, e}] = f;
     }
   }
-  return out_;
+  if (cuts > 0)
+    out.warnings.push_back("at " + count_of(cuts, "edge") + " no two triangles go on in each other, the first where " +
+                           first + ": the mesh is cut there; take out what isn't the body's surface");
+  return of;
 }
 
 // One vertex for each fan of faces.
@@ -284,7 +285,6 @@ void Repair::part_sheets() {
     return 3 * f + static_cast<int>(std::ranges::find(triangles()[f], v) - triangles()[f].begin());
   };
   for (const auto& [side, g] : partner) {
-    if (g < 0) continue;
     for (const int v : top.edge(side.second)) {
       const int r = root(corner(side.first, v)), s = root(corner(g, v));
       fan[std::max(r, s)] = std::min(r, s);
@@ -358,8 +358,8 @@ void Repair::turn_outwards() {
   for (int f = 0; f < count; ++f)
     if (parts[part[f]].turned) std::swap(triangles()[f][1], triangles()[f][2]);
   if (bodies > 0)
-    out.repairs.push_back(count_of(faces, "triangle") + " of " + count_of(bodies, "closed surface") +
-                          " that was inside out turned, the first at " + at(first));
+    out.repairs.push_back(count_of(faces, "triangle") + " turned: " + count_of(bodies, "closed surface") +
+                          (bodies == 1 ? " was" : " were") + " inside out, the first at " + at(first));
 }
 
 void Repair::tell_holes() {

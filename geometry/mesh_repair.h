@@ -20,11 +20,11 @@ struct RepairedMesh {
 // Numbers and places are those of the mesh as given. The result satisfies:
 //   (1) every vertex is used, no two of a part are within a millionth of the size, no triangle is without area;
 //   (2) an edge has two faces at most, which run along it in opposite ways; the faces around a vertex are one fan: what
-//       merely touches is taken apart;
+//       merely touches is taken apart, and so are, with a warning, faces of which no two go on in each other (three
+//       that meet in an edge, a band with a half twist);
 //   (3) a closed part faces outwards, unless it lies in another one and the file says otherwise.
-// Triangles without area are taken out or flipped, twins are taken out, minorities turned. Throws GeometryError, with
-// the place, where no surface can be made of it: no triangle, a number that isn't finite, a band with a half twist, an
-// edge where three or more sheets meet without an inside between them.
+// Triangles without area are taken out or flipped, twins are taken out, minorities turned. Throws GeometryError where
+// no triangle is left and, with the place, for a number that isn't finite.
 RepairedMesh repair_mesh(const TriangleMesh& mesh);
 
 // How often the triangles wind around p: of a closed mesh that faces outwards 1 inside and 0 outside.

@@ -125,7 +125,7 @@ TEST(MeshRepair, TurnsMinoritiesAndBodiesThatAreInsideOut) {
   EXPECT_NEAR(volume(repaired(some).mesh), right, 1e-12);
   EXPECT_TRUE(says(repaired(some).repairs, "5 triangles turned"));
   EXPECT_NEAR(volume(repaired(all).mesh), right, 1e-12);
-  EXPECT_TRUE(says(repaired(all).repairs, "1 closed surface that was inside out turned"));
+  EXPECT_TRUE(says(repaired(all).repairs, "1 closed surface was inside out"));
 }
 
 TEST(MeshRepair, KeepsACavityThatTheFileHas) {
@@ -222,13 +222,21 @@ TEST(MeshRepair, RefusesWhatIsNoSurfaceWithThePlace) {
   bad = box;
   bad.vertices.setConstant(0.5);
   EXPECT_NE(refusal(bad).find("at one place, (0.5, 0.5, 0.5)"), std::string::npos);
+}
+
+TEST(MeshRepair, CutsWhereNoTwoTrianglesGoOnInEachOther) {
   // A fin on an edge of the box.
-  bad = box;
-  bad.vertices.conservativeResize(3, 9);
-  bad.vertices.col(8) << 0, -3, -3;
-  bad.triangles.push_back({0, 1, 8});
-  EXPECT_NE(refusal(bad).find("3 triangles meet in the edge from (-1, -1, -1) to (1, -1, -1)"), std::string::npos)
-      << refusal(bad);
+  TriangleMesh fin = test::box_mesh({1, 1, 1});
+  fin.vertices.conservativeResize(3, 9);
+  fin.vertices.col(8) << 0, -3, -3;
+  fin.triangles.push_back({0, 1, 8});
+  const RepairedMesh cut = repaired(fin);
+  EXPECT_FALSE(cut.closed);
+  EXPECT_EQ(cut.mesh.triangles.size(), 13u);
+  EXPECT_TRUE(
+      says(cut.warnings,
+           "at 1 edge no two triangles go on in each other, the first where 3 meet from (-1, -1, -1) to (1, -1, -1)"))
+      << cut.warnings[0];
   // A band of five quads with a half twist.
   TriangleMesh band;
   band.vertices.resize(3, 10);
@@ -244,7 +252,10 @@ TEST(MeshRepair, RefusesWhatIsNoSurfaceWithThePlace) {
     band.triangles.push_back({a, b, c});
     band.triangles.push_back({b, d, c});
   }
-  EXPECT_NE(refusal(band).find("one side only"), std::string::npos) << refusal(band);
+  const RepairedMesh parted = repaired(band);
+  EXPECT_TRUE(says(parted.warnings, "at 1 edge no two triangles")) << parted.warnings[0];
+  EXPECT_TRUE(says(parted.warnings, "is open: 1 border"));
+  EXPECT_EQ(parted.mesh.vertices.cols(), 12);
 }
 
 TEST(WindingNumber, IsOneInsideAndZeroOutside) {
