@@ -103,7 +103,7 @@ void cut(const Cut& whole, std::vector<Triangle>& out) {
 TriangleMesh join_borders(TriangleMesh mesh, double gap) {
   // Corners that are the same before those that are only near.
   merge_border_vertices(mesh, 1e-3 * gap);
-  merge_border_vertices(mesh, 0.5 * gap);
+  merge_border_vertices(mesh, 0.25 * gap);
   const MeshTopology topology(mesh.triangles, static_cast<int>(mesh.vertices.cols()));
   const Sweep sweep(mesh);
   std::vector<Triangle> out;

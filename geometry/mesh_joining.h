@@ -7,7 +7,7 @@
 namespace toile {
 
 // Borders that run along each other within `gap` become one, whatever points either of them has: border vertices nearer
-// than half of it are one, others split the edge that they lie on. No vertex moves farther than `gap`; nothing but
+// than a quarter of it are one, others split the edge that they lie on. No vertex moves farther than `gap`; nothing but
 // borders changes. Where one part meets itself (the seam of a closed surface, a pole) it is joined too.
 TriangleMesh join_borders(TriangleMesh mesh, double gap);
 

@@ -23,6 +23,16 @@ class Refinement {
       : face_(face), uv_(coarse.uv), triangles_(coarse.triangles), trims_(coarse.uv.size()) {
     for (const Vector2d& uv : uv_) x_.push_back(face.surface(uv.x(), uv.y()));
     for (const BoundaryVertex& b : coarse.boundary) trims_[b.vertex].push_back({b.loop, b.curve, b.t});
+    // A vertex where a curve ends is listed with the next one.
+    for (const BoundaryVertex& b : coarse.boundary) {
+      const TrimLoop& loop = face.loops[b.loop];
+      for (int k = 0; k < static_cast<int>(loop.curves.size()); ++k) {
+        const Curve2& curve = loop.curves[k].curve;
+        for (const double t : {curve.domain().min, curve.domain().max})
+          if ((curve(t) - uv_[b.vertex]).norm() <= loop.gap + 1e-12 * uv_[b.vertex].norm())
+            trims_[b.vertex].push_back({b.loop, k, t});
+      }
+    }
   }
 
   // Halves every edge that is farther off than `chord_error`, and the longest edge of such triangles. Whether there was

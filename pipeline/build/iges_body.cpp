@@ -19,15 +19,16 @@ IgesBody read_iges_body(const std::filesystem::path& path, double chord_error) {
   out.metres_per_unit = file.metres_per_unit;
   out.warnings = file.warnings;
   for (const std::string& reason : file.refused) out.warnings.push_back("left out: " + reason);
-  // Half for the faces; neighbours may be as far apart as the other half where they are joined.
-  const double half = 0.5 * chord_error / file.metres_per_unit;
+  // A third for the faces; their borders may be twice that apart where they are joined, as each is off by a third, and
+  // vertices that become one move by half of one.
+  const double third = chord_error / file.metres_per_unit / 3;
   std::vector<Eigen::Vector3d> vertices;
   std::string first_reason;
   for (TrimmedSurface face : file.panels) {
     try {
       validate_loops(face);
-      const FaceTriangles triangles = face_triangles(face, half);
-      if (triangles.chord_error > half)
+      const FaceTriangles triangles = face_triangles(face, third);
+      if (triangles.chord_error > third)
         out.warnings.push_back(fmt::format("face '{}' ({}): its triangles are up to {:.3g} mm off, more than asked for",
                                            face.name, face.source,
                                            1000 * file.metres_per_unit * triangles.chord_error));
@@ -45,7 +46,7 @@ IgesBody read_iges_body(const std::filesystem::path& path, double chord_error) {
     throw GeometryError(first_reason.empty() ? path.string() + ": holds no face and no surface" : first_reason);
   out.mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
   for (std::size_t k = 0; k < vertices.size(); ++k) out.mesh.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
-  out.mesh = join_borders(std::move(out.mesh), std::max(half, 2 * file.resolution));
+  out.mesh = join_borders(std::move(out.mesh), std::max(2 * third, 2 * file.resolution));
   return out;
 }
 

@@ -61,9 +61,9 @@ std::string size_advice(double size, double metres_per_unit) {
     const double would_be = size / metres_per_unit * metres, off = std::abs(std::log(would_be / usual));
     if (off >= nearest) continue;
     nearest = off;
-    advice = fmt::format("; unit = \"{}\" would make it {:.3g} m", unit, would_be);
+    advice = fmt::format(" unit = \"{}\" would make it {:.4g} m", unit, would_be);
   }
-  return fmt::format("it is {:.3g} m large: is the file's unit another one?{}", size, advice);
+  return fmt::format("it is {:.4g} m large: is the file's unit another one?{}", size, advice);
 }
 
 // Says the scene's line before what is wrong with a file.

@@ -368,7 +368,10 @@ std::vector<std::string> joined(std::vector<std::string> first, const std::vecto
 
 int check_scene(Scene scene, bool json, Console& console) {
   const ObstacleCheck obstacles = check_obstacles(scene);
-  if (!json) tell(obstacles, console);
+  if (!json) {
+    tell(obstacles, console);
+    for (const std::string& note : scene.notes) console.note(note);
+  }
   const Build built = build(std::move(scene));
   const std::unique_ptr<System> system = assemble(built, 0);
   const std::vector<std::string> idle = not_simulated(built.scene);
@@ -386,7 +389,7 @@ int check_scene(Scene scene, bool json, Console& console) {
     out["obstacles"] = obstacles.about;
     out["errors"] = obstacles.faults;
     out["warnings"] = joined(obstacles.warnings, built.warnings);
-    out["notes"] = joined(obstacles.notes, built.notes);
+    out["notes"] = joined(joined(obstacles.notes, built.scene.notes), built.notes);
     out["not_simulated"] = idle;
     fmt::print("{}\n", json_text(out));
     return valid ? exit_ok : exit_input;

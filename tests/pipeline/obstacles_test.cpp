@@ -166,8 +166,7 @@ TEST(Obstacles, AnAbsurdSizeIsAdvisedOn) {
   const Bodies folder("obstacle_size");
   write_file(folder / "mm.obj", obj_text(test::box_mesh({200, 850, 150})));
   EXPECT_TRUE(says(folder.build("mesh = \"mm.obj\"").warnings,
-                   "it is 1.7e+03 m large: is the file's unit another one? unit = \"mm\" would make it 1.7 m") ||
-              says(folder.build("mesh = \"mm.obj\"").warnings, "unit = \"mm\" would make it 1.7 m"));
+                   "it is 1700 m large: is the file's unit another one? unit = \"mm\" would make it 1.7 m"));
   EXPECT_TRUE(folder.build("mesh = \"mm.obj\", unit = \"mm\"").warnings.empty());
   EXPECT_TRUE(says(folder.build("mesh = \"box.obj\", unit = \"mm\"").warnings, "unit = \"m\" would make it 1 m"));
 }
@@ -229,7 +228,7 @@ TEST(Obstacles, FacesOfAnIgesFileBecomeOneClosedBody) {
         Case{corpus / "iges/solid_186.igs", 30 * 40 * 50 / 6.0, 5000},
         Case{corpus / "iges/sphere_and_torus.igs", 4 * pi / 3 * 21 * 21 * 21 + 2 * pi * pi * 30 * 8 * 8,
              4 * pi * 21 * 21 + 4 * pi * pi * 30 * 8}})
-    for (const double chord_error : {0.25, 0.05}) {
+    for (const double chord_error : {0.25, 0.1}) {
       SCOPED_TRACE(file);
       SCOPED_TRACE(chord_error);
       const IgesBody body = read_iges_body(file, 1e-3 * chord_error);
@@ -239,7 +238,7 @@ TEST(Obstacles, FacesOfAnIgesFileBecomeOneClosedBody) {
     }
   const BuiltObstacle built = folder.build("mesh = \"can.igs\", up = \"y\"");
   EXPECT_NE(built.about.find("closed, 0.2 x 0.3 x 0.2 m"), std::string::npos) << built.about;
-  EXPECT_NEAR(distance(built, {0, -0.1, 0.01}), -0.01, 1e-9);
+  EXPECT_NEAR(distance(built, {0, -0.01, 0.01}), -0.01, 1e-9);
   EXPECT_NEAR(distance(built, {0.15, -0.15, 0}), 0.05, 0.00025);
 }
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "geometry/error.h"
+#include "geometry/nurbs_curve.h"
 #include "geometry/nurbs_surface.h"
 #include "trimming/loops.h"
 
@@ -59,6 +60,31 @@ TEST(FaceTriangles, MeetTheChordErrorWithoutWaste) {
     EXPECT_NEAR(area(found.mesh), exact, exact * error);
     const double longest = 2 * std::sqrt(2 * error);
     EXPECT_LT(static_cast<double>(found.mesh.triangles.size()), 40 * exact / (longest * longest));
+  }
+}
+
+// In a plane nothing but the trims asks for triangles: a disc by one curve, by two and by five.
+TEST(FaceTriangles, BordersFollowTheirTrims) {
+  constexpr double pi = 3.14159265358979323846, error = 1e-3;
+  Eigen::Matrix3Xd net(3, 4);
+  net << -2, 2, -2, 2, -2, -2, 2, 2, 0, 0, 0, 0;
+  for (const int parts : {1, 2, 5}) {
+    SCOPED_TRACE(parts);
+    TrimmedSurface face = untrimmed(NurbsSurface(KnotVector(1, {-2, -2, 2, 2}), KnotVector(1, {-2, -2, 2, 2}), net));
+    face.natural_bounds = false;
+    TrimLoop loop;
+    for (int k = 0; k < parts; ++k) {
+      TrimCurve trim;
+      trim.curve = circular_arc({0, 0}, 1, 1 + 2 * pi * k / parts, 1 + 2 * pi * (k + 1) / parts);
+      trim.index = k;
+      loop.curves.push_back(trim);
+    }
+    face.loops = {loop};
+    validate_loops(face);
+    const FaceTriangles found = face_triangles(face, error);
+    // A polygon whose chords are at most `error` off the circle.
+    EXPECT_LT(area(found.mesh), pi);
+    EXPECT_GT(area(found.mesh), pi - 2 * pi * error);
   }
 }
 
