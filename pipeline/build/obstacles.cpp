@@ -10,6 +10,7 @@
 
 #include "analysis/contact/mesh_obstacle.h"
 #include "analysis/contact/self_crossings.h"
+#include "analysis/contact/shapes.h"
 #include "geometry/error.h"
 #include "geometry/mesh_repair.h"
 #include "io/triangle_mesh.h"
@@ -160,11 +161,49 @@ BuiltObstacle build_mesh(const Scene& scene, const SceneObstacle& obstacle) {
   return out;
 }
 
+BuiltObstacle build_shape(const SceneObstacle& o) {
+  const Eigen::Matrix3d turn = o.place.rotation();
+  const auto at = [&](const Vector3d& x) -> Vector3d { return o.place.translate + turn * x; };
+  const ObstacleOptions options{.name = o.name, .friction = o.friction, .thickness = o.thickness};
+  const auto motion = [&](const Vector3d& middle) -> RigidMotion {
+    if (!o.move) return nullptr;
+    return [move = *o.move, middle](double t) { return move.at(t, middle); };
+  };
+  BuiltObstacle out;
+  const auto take = [&](const auto& shape, const Vector3d& middle, const std::string& about) {
+    out.obstacle = make_obstacle(shape, options, motion(middle));
+    out.about = fmt::format("obstacle '{}': {}", o.name, about);
+  };
+  const Vector3d centre = at(o.centre), from = at(o.from), to = at(o.to);
+  switch (o.kind) {
+    case ObstacleKind::mesh:
+      break;
+    case ObstacleKind::plane:
+      take(PlaneShape{at(o.point), turn * o.normal}, at(o.point), "a plane");
+      break;
+    case ObstacleKind::sphere:
+      take(SphereShape{centre, o.radius}, centre, fmt::format("a sphere of radius {:.3g} m", o.radius));
+      break;
+    case ObstacleKind::cylinder:
+      take(CylinderShape{from, to, o.radius}, 0.5 * (from + to),
+           fmt::format("a cylinder of radius {:.3g} m, {:.3g} m long", o.radius, (to - from).norm()));
+      break;
+    case ObstacleKind::capsule:
+      take(CapsuleShape{from, to, o.radius}, 0.5 * (from + to),
+           fmt::format("a capsule of radius {:.3g} m, {:.3g} m long", o.radius, (to - from).norm()));
+      break;
+    case ObstacleKind::box:
+      take(BoxShape{centre, o.size, turn}, centre,
+           fmt::format("a box, {:.3g} x {:.3g} x {:.3g} m", o.size.x(), o.size.y(), o.size.z()));
+      break;
+  }
+  return out;
+}
+
 }  // namespace
 
 BuiltObstacle build_obstacle(const Scene& scene, const SceneObstacle& obstacle) {
-  if (obstacle.kind != ObstacleKind::mesh)
-    throw InputError(fmt::format("{}: shapes are not simulated by this version; use a mesh", title(obstacle)));
+  if (obstacle.kind != ObstacleKind::mesh) return reading(obstacle, "its shape", [&] { return build_shape(obstacle); });
   return build_mesh(scene, obstacle);
 }
 

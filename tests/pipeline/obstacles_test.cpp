@@ -89,6 +89,33 @@ TEST(Obstacles, AMeshIsPutWhereTheSceneSays) {
   EXPECT_NEAR(distance(folder.build("mesh = \"box.obj\", up = \"z\"", y_up), {0, 0.225, 0}), 0.1, 1e-7);
 }
 
+// Each seen from a place whose distance is known; turned a quarter about x, which takes y to z, then 1 m along x.
+TEST(Obstacles, ShapesArePutAndMovedAsMeshesAre) {
+  const Bodies folder("obstacle_shapes");
+  struct Case {
+    const char* keys;
+    Vector3d p;
+    double distance;
+  };
+  for (const Case& c :
+       {Case{"shape = \"plane\", point = [0, 1, 0], normal = [0, 1, 0]", {9, 9, 1.5}, 0.5},
+        Case{"shape = \"sphere\", centre = [0, 1, 0], radius = 0.25", {1, 0, 1.5}, 0.25},
+        Case{"shape = \"cylinder\", from = [0, 0, 0], to = [0, 1, 0], radius = 0.25", {1.5, 0, 0.5}, 0.25},
+        Case{"shape = \"capsule\", from = [0, 0, 0], to = [0, 1, 0], radius = 0.25", {1, 0, 1.5}, 0.25},
+        Case{"shape = \"box\", centre = [0, 1, 0], size = [1, 2, 3]", {1, 0, 2.5}, 0.5}}) {
+    SCOPED_TRACE(c.keys);
+    const std::string keys = c.keys + std::string(", place = { translate = [1, 0, 0], rotate_deg = [90, 0, 0] }");
+    const BuiltObstacle still = folder.build(keys + ", friction = 0.6");
+    EXPECT_TRUE(still.obstacle->still());
+    EXPECT_EQ(still.obstacle->friction(), 0.6);
+    EXPECT_EQ(still.obstacle->thickness(), 0);
+    EXPECT_NEAR(distance(still, c.p), c.distance, 1e-12);
+    const BuiltObstacle moved = folder.build(keys + ", move = { translate = [0, 0, 2], end = 1 }");
+    moved.obstacle->move(0, 1);
+    EXPECT_NEAR(distance(moved, c.p + Vector3d(0, 0, 2)), c.distance, 1e-12);
+  }
+}
+
 TEST(Obstacles, MoveAboutTheMiddleAndThroughShapes) {
   const Bodies folder("obstacle_motion");
   TriangleMesh wide = test::box_mesh({0.5, 0.5, 0.125});
