@@ -103,6 +103,7 @@ struct ContactProjection::Impl {
   };
   std::vector<Sharp> sharp;
   std::optional<SelfSearch> self;
+  int worst = -1;  // row that the last sweep moved most
   ProjectionMemory memory;
   Counts counts;
 
@@ -487,8 +488,10 @@ double ContactProjection::Impl::sweep(Nodes x) {
     if (change.isZero(0)) continue;
     push(row, change, x);
     push(row, change, pushed);
+    const double before = largest;
     largest = std::max({largest, std::abs(more) * row.weight / (normal_tolerance * touch(row)),
                         (row.drag - drag_before).norm() * row.weight / least_slip});
+    if (largest > before) worst = static_cast<int>(&row - rows.data());
   }
   return largest;
 }
@@ -592,6 +595,7 @@ ProjectionReport ContactProjection::step(Nodes x, Nodes v, double t, const Eigen
     if (!settled) s.set_impulses(faster.next(z, s.impulses()));
   }
   v += (s.pushed - s.held) / dt;
+  report.contact_met = settled;
   report.converged = report.converged && settled;
   forces.contact = s.keep(x);
   s.note_impulses();
@@ -707,6 +711,11 @@ std::size_t ContactProjection::gram_nonzeros() const {
 }
 const std::vector<ContactRow>& ContactProjection::contacts() const {
   return impl_->rows;
+}
+const ContactRow* ContactProjection::worst() const {
+  return impl_->worst >= 0 && impl_->worst < static_cast<int>(impl_->rows.size())
+             ? &impl_->rows[static_cast<std::size_t>(impl_->worst)]
+             : nullptr;
 }
 const ContactProxy& ContactProjection::proxy() const {
   return impl_->proxy;

@@ -59,6 +59,7 @@ class ContactProjection final : public ConstraintSolver {
   std::size_t gram_nonzeros() const override;
 
   const std::vector<ContactRow>& contacts() const;  // of the last step
+  const ContactRow* worst() const;                  // the one farthest from its balance there; null: none
   const ContactProxy& proxy() const;
   struct Counts {
     long steps = 0, rounds = 0, sweeps = 0, queries = 0;

@@ -28,13 +28,14 @@ struct ProjectionReport {
   double within = 1;          // part of the strain rows, by area, that meets its limit: where a percentile is held
   double energy = 0;          // J, of the limit laws at the end
   int contacts = 0;           // at work at the end
+  bool contact_met = true;    // they and the other constraints found a balance
   double contact_work = 0;    // J, of moving obstacles on the cloth
   double factor_seconds = 0;  // wall time of the numeric factorisations
   double solve_seconds = 0;   // and of the solutions by them
 };
 void fields(auto& archive, Like<ProjectionReport> auto& r) {
   archive(r.converged, r.iterations, r.strain_violation, r.place_violation, r.residual, r.worst_row, r.within, r.energy,
-          r.tightened, r.contacts, r.contact_work);
+          r.tightened, r.contacts, r.contact_met, r.contact_work);
 }
 
 // Contacts at work at one time. Friction holds each to an anchor, a point of the obstacle.

@@ -15,6 +15,8 @@
 #include "geometry/measure.h"
 #include "geometry/refine.h"
 #include "io/panel_file.h"
+#include "pipeline/build/contact.h"
+#include "pipeline/build/obstacles.h"
 #include "pipeline/build/places.h"
 #include "trimming/quadrature.h"
 
@@ -411,6 +413,10 @@ Build build(Scene scene) {
         }
       }
     }
+  }
+  if (touches(result.scene)) {
+    result.obstacles = build_obstacles(result.scene, result.warnings, result.notes);
+    result.proxies = contact_proxies(result, result.notes);
   }
   for (const OutputPoint& point : result.scene.points) {
     const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(point.panel))];

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "analysis/constraint/constraint_rows.h"
+#include "analysis/contact/contact_proxy.h"
+#include "analysis/contact/obstacle.h"
 #include "analysis/map/affine_map.h"
 #include "analysis/map/smooth_seam.h"
 #include "analysis/model/model.h"
@@ -42,6 +44,8 @@ struct Build {
   Eigen::VectorXd start;         // 3 n [m]
   Eigen::VectorXd mass_floor;    // n [kg]: 0.01 of density times cell area
   Loads loads;
+  std::vector<std::unique_ptr<Obstacle>> obstacles;  // in the scene's order; moved by the run
+  std::vector<ProxyPanel> proxies;                   // per panel; empty where nothing touches
   std::vector<std::string> warnings;
   std::vector<std::string> notes;  // decisions that say nothing against the scene or its files
   double read_seconds = 0, trim_seconds = 0;

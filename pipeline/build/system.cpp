@@ -16,6 +16,7 @@
 #include "analysis/projection/primal_dual.h"
 #include "analysis/projection/substeps.h"
 #include "geometry/error.h"
+#include "pipeline/build/contact.h"
 #include "pipeline/build/independent_rows.h"
 #include "pipeline/build/pin_reach.h"
 #include "pipeline/build/places.h"
@@ -334,6 +335,12 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   if (!rows.strain.empty() || !rows.place.empty()) {
     system->projection = constraint_solver(build, partial, *system->map, dynamic.node_mass, std::move(rows));
     system->projection->use_threads(dynamic.workers);
+  }
+  if (touches(scene)) {
+    auto contact = with_contact(build, *system->map, dynamic.node_mass, std::move(system->projection));
+    contact->use_threads(dynamic.workers);
+    system->contact = contact.get();
+    system->projection = std::move(contact);
   }
   dynamic.projection = system->projection.get();
   if (implicit(scene)) {

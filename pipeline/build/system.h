@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/contact/contact_projection.h"
 #include "analysis/scheme/implicit.h"
 #include "pipeline/build/build.h"
 
@@ -29,6 +30,7 @@ struct System {
   std::vector<PlaceRow> along_curves;         // 200 places along each curve that a pin holds by some of its points
   std::unique_ptr<AffineMap> map;
   std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
+  const ContactProjection* contact = nullptr;    // the same, where anything may touch
   MechanicalSystem dynamic;
   std::unique_ptr<ImplicitScheme> implicit;  // null: velocity Verlet
 };

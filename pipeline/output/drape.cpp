@@ -81,7 +81,6 @@ std::vector<std::string> not_simulated(const Scene& scene) {
                     tables.front().where, words, tables.size(), key, tables.size() == 1 ? "" : "s", key));
   };
   add(scene.seams, "seam", "seams");
-  add(scene.obstacles, "obstacle", "obstacles");
   add(scene.contact_pairs, "contact_pair", "contact pairs");
   return out;
 }
@@ -217,6 +216,14 @@ void warn_of_end(const Build& built, RunResult& result, const StateMeasures& mea
         "{}: pin {} ({}): between the points held the cloth is up to {:.2g} mm off the curve; smaller cells "
         "(refine) hold it nearer",
         pin.where, k, pin.at.text, 1000 * *measures.gaps[k]));
+  }
+  if (measures.contact && measures.contact->penetration > measures.contact->allowed && result.exit == RunExit::ok) {
+    result.exit = RunExit::check_failed;
+    result.reason = fmt::format(
+        "the cloth is {:.2g} mm nearer than its thickness and the obstacle's skin allow ({:.2g} mm allowed), deepest "
+        "at "
+        "{}. A smaller contact.spacing or contact.chord, or smaller cells (refine), keep it farther off",
+        1e3 * measures.contact->penetration, 1e3 * measures.contact->allowed, measures.contact->where);
   }
   const BetweenPoints between = strained_between_points(built, measures);
   if (between.failed && result.exit == RunExit::ok) {

@@ -110,7 +110,7 @@ std::string History::row(const RunResult& now) const {
   cells.push_back(std::to_string(stepped ? now.last_projection.iterations : 0));
   cells.push_back(text(now.iterations_sum));
   cells.push_back(std::to_string(now.redone_steps));
-  cells.emplace_back();
+  cells.push_back(now.system->contact ? std::to_string(stepped ? now.last_projection.contacts : 0) : "");
   add_vectors(cells, pin_reactions(build_, *now.system, now.state, stepped ? now.dt_last : 0));
   add_vectors(cells, output_points(build_, q));
   return csv_row(cells);

@@ -76,6 +76,33 @@ std::vector<std::pair<const char*, double>> energy_entries(const EnergyBalance& 
   return entries;
 }
 
+namespace {
+
+double contact_seconds(const ContactProjection& contact) {
+  return contact.counts().search_seconds + contact.counts().sweep_seconds;
+}
+
+Json contact_json(const Build& build, const System& system, const RunResult& run, const StateMeasures& m) {
+  if (!system.contact || !m.contact) return {{"max_penetration", nullptr}, {"min_distance", nullptr}};
+  const ContactProjection::Counts& counts = system.contact->counts();
+  const double steps = std::max(1.0, static_cast<double>(counts.steps));
+  Json out = {{"max_penetration", m.contact->penetration},
+              {"min_distance", nullptr},
+              {"allowed", m.contact->allowed},
+              {"contacts", run.last_projection.contacts},
+              {"sampled_points", system.contact->proxy().vertices()},
+              {"rounds_mean", static_cast<double>(counts.rounds) / steps},
+              {"sweeps_mean", static_cast<double>(counts.sweeps) / steps}};
+  if (std::isfinite(m.contact->distance)) out["min_distance"] = m.contact->distance;
+  if (!m.contact->where.empty()) out["deepest"] = m.contact->where;
+  out["obstacles"] = Json::array();
+  for (std::size_t k = 0; k < build.obstacles.size(); ++k)
+    out["obstacles"].push_back({{"name", build.obstacles[k]->name()}, {"force", array(m.contact->forces[k])}});
+  return out;
+}
+
+}  // namespace
+
 Json report_json(const Build& build, const RunResult& run, const StateMeasures& m, double write_seconds) {
   const Scene& scene = build.scene;
   const System& system = *run.system;
@@ -107,7 +134,7 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
                        {"force", run.force_seconds},
                        {"projection", run.projection_seconds},
                        {"time_step", run.bound_seconds},
-                       {"contact", 0.0},
+                       {"contact", system.contact ? contact_seconds(*system.contact) : 0.0},
                        {"write", run.frame_seconds + write_seconds}};
   report["dt"] = {{"min", run.dt_min}, {"max", run.dt_max}};
   std::size_t points = 0, used = 0;
@@ -177,17 +204,23 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
     report["projection"]["percentile_held"] = 100 * run.last_projection.within;
     report["projection"]["worst_row"] = run.last_projection.strain_violation;
   }
-  // Numbers of what doesn't exist in a run are null, not 0: nothing touches and nothing is sewn in this version.
-  report["contact"] = {{"max_penetration", nullptr}, {"min_distance", nullptr}};
+  // Numbers of what doesn't exist in a run are null, not 0: nothing is sewn in this version.
+  report["contact"] = contact_json(build, system, run, m);
   report["seams"] = {{"max_gap", nullptr}};
   Json stages = Json::array({"shell"});
-  if (system.projection) stages.push_back("projection");
+  if (system.strain_rows + system.place_rows > 0) stages.push_back("projection");
+  if (system.contact) stages.push_back("contact");
   report["stages"] = stages;
   // What each stage that ran took. `seconds` above counts the same seconds, of stages that didn't run too.
   Json counters = {{"shell", {{"seconds", run.force_seconds}, {"bytes", build.model->table_bytes()}}}};
-  if (system.projection) {
+  if (system.strain_rows + system.place_rows > 0) {
     counters["projection"] = {{"seconds", run.projection_seconds},
                               {"bytes", sizeof(double) * system.projection->factor_nonzeros()}};
+  }
+  if (system.contact) {
+    const ContactProjection::Counts& counts = system.contact->counts();
+    counters["contact"] = {
+        {"seconds", contact_seconds(*system.contact)}, {"rounds", counts.rounds}, {"sweeps", counts.sweeps}};
   }
   counters["steps"] = {{"count", run.steps + run.redone_steps}};
   counters["time_step"] = {{"seconds", run.bound_seconds}};

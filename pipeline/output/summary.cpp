@@ -57,6 +57,15 @@ std::vector<std::string> summary(const Build& build, const RunResult& result, co
                               m.shear.max));
   lines.push_back(fmt::format("  mean strain {:.2g} weft, {:.2g} warp; at most {:.2g} at constraint points",
                               m.strain.mean_abs[0], m.strain.mean_abs[1], m.at_constraints_max));
+  if (result.system->contact) {
+    std::string line = fmt::format("  {} contacts", result.last_projection.contacts);
+    if (m.contact && m.contact->penetration > 0)
+      line += fmt::format(", the cloth up to {:.2g} mm nearer than its thickness and the skin",
+                          1e3 * m.contact->penetration);
+    for (std::size_t k = 0; m.contact && k < m.contact->forces.size(); ++k)
+      line += fmt::format("; obstacle '{}' carries {:.3g} N", build.obstacles[k]->name(), m.contact->forces[k].norm());
+    lines.push_back(line);
+  }
   return lines;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "pipeline/run/measures.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -200,6 +202,60 @@ std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& sys
   return out;
 }
 
+namespace {
+
+constexpr int points_per_cell = 7;    // each way, borders included
+constexpr double within_reach = 0.1;  // m: beyond it a distance isn't looked for
+
+ContactMeasures measure_contact(const Build& build, const System& system, const Eigen::VectorXd& q, double dt) {
+  ContactMeasures m;
+  m.distance = std::numeric_limits<double>::infinity();
+  double worst = 0;  // over what is allowed
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const BuiltPanel& panel = build.panels[k];
+    const KnotMesh& mesh = panel.topology.mesh;
+    const double thickness = build.model->panels()[k].fabric.thickness;
+    for (int j = 0; j < mesh.cells_v(); ++j)
+      for (int i = 0; i < mesh.cells_u(); ++i) {
+        const CellKind kind = panel.topology.cells[static_cast<std::size_t>(mesh.cell(i, j))];
+        if (kind == CellKind::outside) continue;
+        for (int b = 0; b < points_per_cell; ++b)
+          for (int a = 0; a < points_per_cell; ++a) {
+            const auto part = [](const std::vector<double>& lines, int cell, int n) {
+              const double from = lines[static_cast<std::size_t>(cell)], to = lines[static_cast<std::size_t>(cell) + 1];
+              return from + (to - from) * n / (points_per_cell - 1);
+            };
+            const Eigen::Vector2d uv(part(mesh.u, i, a), part(mesh.v, j, b));
+            if (kind == CellKind::cut && !contains(panel.face, panel.topology, uv)) continue;
+            const Eigen::Vector3d at = apply(build.model->place(static_cast<int>(k), uv.x(), uv.y()), q);
+            for (const auto& obstacle : build.obstacles) {
+              const auto near = obstacle->nearest(at, within_reach);
+              if (!near) continue;
+              const double distance = obstacle->closed() ? near->distance : std::abs(near->distance);
+              m.distance = std::min(m.distance, distance);
+              const double skin = thickness / 2 + obstacle->thickness(),
+                           allowed = 0.1 * (thickness + obstacle->thickness() + build.scene.contact.chord);
+              if (!(skin - distance > m.penetration)) continue;
+              m.penetration = skin - distance;
+              if (!((skin - distance) / allowed > worst)) continue;
+              worst = (skin - distance) / allowed;
+              m.allowed = allowed;
+              m.where = fmt::format("panel '{}' at (u, v) = ({:.6g}, {:.6g}) and obstacle '{}'", panel.name, uv.x(),
+                                    uv.y(), obstacle->name());
+            }
+          }
+      }
+  }
+  for (std::size_t k = 0; k < build.obstacles.size(); ++k) {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    if (dt > 0) force = system.contact->memory().by_obstacle.col(static_cast<Eigen::Index>(k)) / (dt * dt);
+    m.forces.push_back(force);
+  }
+  return m;
+}
+
+}  // namespace
+
 StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt) {
   StateMeasures m;
   const Model& model = *build.model;
@@ -268,6 +324,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
       m.mass += area * panel.fabric.density;
     }
   }
+  if (system.contact && !build.obstacles.empty()) m.contact = measure_contact(build, system, q, dt);
   m.points = output_points(build, q);
   m.reactions = pin_reactions(build, system, state, dt);
   m.gaps.resize(build.scene.pins.size());

@@ -34,9 +34,19 @@ struct ShearExtremes {
   double min = 0, max = 0, mean_abs = 0;
 };
 
+// How near cloth and obstacles are, by 7 x 7 points of the surface a cell.
+struct ContactMeasures {
+  double penetration = 0;               // m: how far the cloth's surface is within half its thickness and the skin
+  double allowed = 0;                   // m, there: 0.1 of the cloth's thickness, the skin and the chord error
+  double distance = 0;                  // m, least, of the cloth's middle from an obstacle's surface; infinite: far
+  std::string where;                    // of the penetration
+  std::vector<Eigen::Vector3d> forces;  // N, of each obstacle on the cloth in the last step
+};
+
 struct StateMeasures {
-  Extremes strain;      // E11, E22
-  ShearExtremes shear;  // 2 E12, on the same grid
+  std::optional<ContactMeasures> contact;  // where obstacles are
+  Extremes strain;                         // E11, E22
+  ShearExtremes shear;                     // 2 E12, on the same grid
   // N/m, the fabric's and what the strain limit carries, recovered [eq. 37]. Min and max also see the cloth's border.
   Extremes nominal;
   Extremes second_pk;                      // N/m, likewise

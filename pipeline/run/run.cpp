@@ -9,6 +9,7 @@
 
 #include "geometry/clock.h"
 #include "geometry/error.h"
+#include "pipeline/build/contact.h"
 
 namespace toile {
 namespace {
@@ -252,6 +253,11 @@ class Run::Impl {
   // A limit with a law has a balance at every step that is small enough; hard rows that depend on each other may not.
   std::string unmet(const StepReport& report) const {
     const ProjectionReport& p = report.projection;
+    if (!p.contact_met) {
+      const ContactRow* row = result_.system->contact->worst();
+      return fmt::format("the contacts find no balance{}{}", row ? ", least of all between " : "",
+                         row ? describe_contact(build_, result_.system->contact->proxy(), *row) : "");
+    }
     if (p.converged || hard_limit() || by_percentile() || (!scene_.strain_limit.on && !implicit())) return {};
     return fmt::format("{} no balance in {} iterations (strain {:.3g}, pins off by {:.3g} m)",
                        implicit() ? "the step finds" : "the strain limit and the pins find", p.iterations,

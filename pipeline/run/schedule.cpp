@@ -29,6 +29,11 @@ double pins_done(const Scene& scene) {
     if (pin.move) t = std::max(t, pin.release ? std::min(*pin.release, pin.move->end) : pin.move->end);
     if (pin.release) t = std::max(t, *pin.release);
   }
+  for (const SceneObstacle& obstacle : scene.obstacles) {
+    if (obstacle.move) t = std::max(t, obstacle.move->end);
+    if (obstacle.morph) t = std::max(t, obstacle.morph->end);
+    if (!obstacle.times.empty()) t = std::max(t, obstacle.times.back());
+  }
   return t;
 }
 

@@ -236,4 +236,12 @@ void read_contact_pairs(Table& top, Scene& scene) {
   }
 }
 
+void read_contact(Table& table, SceneContact& contact) {
+  contact.self = table.boolean("self").value_or(false);
+  table.number(contact.chord, "chord", dimension::length, Range::positive);
+  contact.spacing = table.number("spacing", dimension::length, Range::positive);
+  table.number(contact.push_out, "push_out", dimension::velocity, Range::positive);
+  table.done();
+}
+
 }  // namespace toile

@@ -22,5 +22,6 @@ PinMotion read_motion(Table& move);
 // [[obstacle]] and, once panels and obstacles are read, [[contact_pair]].
 void read_obstacles(Table& top, Scene& scene);
 void read_contact_pairs(Table& top, Scene& scene);
+void read_contact(Table& table, SceneContact& contact);
 
 }  // namespace toile

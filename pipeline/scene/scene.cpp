@@ -562,6 +562,7 @@ void read_settings(Table& top, Scene& scene) {
           fmt::format("{}: gravity and wind in [load] must be below {} m/s2 and m/s", table->where(), most));
     table->done();
   }
+  if (auto table = top.table("contact", "[contact]")) read_contact(*table, scene.contact);
   if (auto table = top.table("solver", "[solver]")) read_solver(*table, scene);
   if (auto table = top.table("output", "[output]")) read_output(*table, scene);
   if (!scene.rest && scene.until / scene.every > 1e6) {
@@ -600,7 +601,7 @@ void require_pins_for_rest(const Scene& scene) {
   for (const ScenePanel& panel : scene.panels) {
     const auto holds = [&](const ScenePin& pin) { return pin.panel == panel.name && !pin.release; };
     const auto pulls = [&](const auto& load) { return load.panel == panel.name; };
-    if (std::ranges::any_of(scene.pins, holds)) continue;
+    if (std::ranges::any_of(scene.pins, holds) || !scene.obstacles.empty()) continue;
     if (scene.gravity.isZero(0) && scene.wind.isZero(0) && std::ranges::none_of(scene.tractions, pulls) &&
         std::ranges::none_of(scene.forces, pulls))
       continue;
@@ -646,6 +647,10 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
   read_obstacles(top, scene);
   read_contact_pairs(top, scene);
   read_settings(top, scene);
+  if (touches(scene) && implicit(scene))
+    throw InputError(fmt::format(
+        "{}: contact goes with solver.scheme = \"verlet\" and rest.method = \"relaxation\" alone in this version",
+        path.string()));
   snap_releases(scene);
   require_pins_for_rest(scene);
   top.done();
@@ -779,6 +784,10 @@ std::span<const FabricPreset> fabric_presets() {
       FabricPreset{"skirt", "skirt of example 4.3(a)", make(50, 0.118, 0.354, 1e-5, 0.8)},
   };
   return presets;
+}
+
+bool touches(const Scene& scene) {
+  return scene.contact.self || !scene.obstacles.empty();
 }
 
 const char* name(LimitSolver solver) {

@@ -147,6 +147,7 @@ struct Scene {
   std::vector<SceneSeam> seams;
   std::vector<SceneObstacle> obstacles;
   std::vector<SceneContactPair> contact_pairs;
+  SceneContact contact;
   StrainLimit strain_limit;
   Eigen::Vector3d gravity{0, 0, -9.81};  // m/s2
   Eigen::Vector3d wind{0, 0, 0};         // m/s
@@ -167,6 +168,8 @@ struct Scene {
 
 // Whether steps are ImplicitScheme's.
 bool implicit(const Scene& scene);
+// Whether anything may touch.
+bool touches(const Scene& scene);
 
 // Reads a scene; `settings` are "key.path=value" with TOML values (a value that isn't TOML is taken as a string) and
 // override or add keys. Throws InputError `scene.toml:12: ...`.

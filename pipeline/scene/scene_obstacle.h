@@ -45,6 +45,14 @@ struct SceneObstacle {
   std::string where;
 };
 
+// [contact]: how the cloth is sampled and what it meets besides obstacles.
+struct SceneContact {
+  bool self = false;              // the cloth meets itself
+  double chord = 0.25e-3;         // m, of flat triangles from cloth that is folded to a radius of 50 mm
+  std::optional<double> spacing;  // m between sampled points; unset: by `chord`
+  double push_out = 0.2;          // m/s, at which cloth that starts too near is moved off
+};
+
 // The friction between two panels, or a panel and an obstacle, by their names.
 struct SceneContactPair {
   std::string a, b;

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "pipeline/build/contact.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace toile {
+namespace {
+
+constexpr double fold_radius = 0.05;  // m, of folds that the chord is stated for
+constexpr int most_divisions = 16;
+
+// Parts of the longest span in each direction, so that points are no farther apart than `spacing`.
+std::pair<int, int> divisions(const NurbsSurface& rest, double spacing) {
+  const auto parts = [&](const KnotVector& along, const KnotVector& across, bool u) {
+    double longest = 0;
+    const std::vector<double> breaks = along.breaks();
+    for (const double c : across.breaks())
+      for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
+        const auto at = [&](double t) { return u ? rest(t, c) : rest(c, t); };
+        longest = std::max(longest, (at(breaks[k + 1]) - at(breaks[k])).norm());
+      }
+    return std::clamp(static_cast<int>(std::ceil(longest / spacing - 1e-6)), 1, most_divisions);
+  };
+  return {parts(rest.u(), rest.v(), true), parts(rest.v(), rest.u(), false)};
+}
+
+}  // namespace
+
+std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& notes) {
+  const SceneContact& contact = build.scene.contact;
+  const double spacing = contact.spacing.value_or(std::sqrt(8 * contact.chord * fold_radius));
+  std::vector<ProxyPanel> out;
+  std::size_t points = 0;
+  for (std::size_t k = 0; k < build.panels.size(); ++k) {
+    const BuiltPanel& panel = build.panels[k];
+    const Fabric& fabric = build.model->panels()[k].fabric;
+    const auto parts = divisions(build.rest(static_cast<int>(k)), spacing);
+    out.push_back({triangulate_cells(panel.face, panel.topology, parts), fabric.thickness / 2, fabric.friction});
+    points += out.back().mesh.uv.size();
+  }
+  notes.push_back(fmt::format("contact: {} points of the cloth, {:.3g} mm apart at most", points, 1e3 * spacing));
+  return out;
+}
+
+std::unique_ptr<ContactProjection> with_contact(const Build& build, const AffineMap& map,
+                                                const Eigen::VectorXd& node_mass,
+                                                std::unique_ptr<ConstraintSolver> inner) {
+  const Scene& scene = build.scene;
+  ContactOptions options;
+  options.self = scene.contact.self;
+  options.push_out = scene.contact.push_out;
+  options.largest_chord = 2 * scene.contact.chord;
+  // Without gravity forces are small beside those of a metre a second squared.
+  options.acceleration = std::max(scene.gravity.norm(), 1.0);
+  options.friction.resize(static_cast<Eigen::Index>(build.panels.size()),
+                          static_cast<Eigen::Index>(build.obstacles.size()));
+  for (Eigen::Index o = 0; o < options.friction.cols(); ++o)
+    options.friction.col(o).setConstant(build.obstacles[static_cast<std::size_t>(o)]->friction());
+  for (const SceneContactPair& pair : scene.contact_pairs)
+    for (std::size_t k = 0; k < build.panels.size(); ++k)
+      for (std::size_t o = 0; o < build.obstacles.size(); ++o) {
+        const std::string &panel = build.panels[k].name, &obstacle = build.obstacles[o]->name();
+        if ((pair.a == panel && pair.b == obstacle) || (pair.a == obstacle && pair.b == panel))
+          options.friction(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(o)) = pair.friction;
+      }
+  return std::make_unique<ContactProjection>(*build.model, map, node_mass, build.proxies, build.obstacles,
+                                             std::move(inner), options);
+}
+
+std::string describe_contact(const Build& build, const ContactProxy& proxy, const ContactRow& row) {
+  const int vertex = row.vertices.front().first;
+  const Eigen::Vector2d& uv = proxy.uv(vertex);
+  const std::string place =
+      fmt::format("panel '{}' at (u, v) = ({:.6g}, {:.6g})",
+                  build.panels[static_cast<std::size_t>(proxy.panel(vertex))].name, uv.x(), uv.y());
+  if (row.key[3] >= 0)
+    return fmt::format("{} and obstacle '{}'", place, build.obstacles[static_cast<std::size_t>(row.key[3])]->name());
+  const int other = row.vertices.back().first;
+  return fmt::format("{} and panel '{}' at ({:.6g}, {:.6g})", place,
+                     build.panels[static_cast<std::size_t>(proxy.panel(other))].name, proxy.uv(other).x(),
+                     proxy.uv(other).y());
+}
+
+}  // namespace toile

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Contact of a scene: the sampled panels, and the solver around the other constraints.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/contact/contact_projection.h"
+#include "pipeline/build/build.h"
+
+namespace toile {
+
+// Sampled by [contact] spacing or chord; what is to be said is added to `notes`.
+std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& notes);
+
+// `inner`: the other constraints, null for none. Both outlive neither `build` nor `map`.
+std::unique_ptr<ContactProjection> with_contact(const Build& build, const AffineMap& map,
+                                                const Eigen::VectorXd& node_mass,
+                                                std::unique_ptr<ConstraintSolver> inner);
+
+// "panel 'front' at (u, v) = (0.2, 0.4) and obstacle 'body'".
+std::string describe_contact(const Build& build, const ContactProxy& proxy, const ContactRow& row);
+
+}  // namespace toile
