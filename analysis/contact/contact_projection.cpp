@@ -83,6 +83,7 @@ std::optional<Meeting> nearest(const Obstacle& obstacle, const Vector3d& p, doub
 struct ContactProjection::Impl {
   AffineMap map;
   ContactProxy proxy;
+  VectorXd drag_rate;  // 1/s, per node
   std::vector<Obstacle*> obstacles;
   std::unique_ptr<ConstraintSolver> inner;
   ContactOptions options;
@@ -107,10 +108,14 @@ struct ContactProjection::Impl {
   ProjectionMemory memory;
   Counts counts;
 
-  Impl(const Body& body, const AffineMap& m, const VectorXd& mass, std::vector<ProxyPanel> panels,
-       const std::vector<std::unique_ptr<Obstacle>>& all, std::unique_ptr<ConstraintSolver> other,
-       const ContactOptions& o)
-      : map(m), proxy(body, m, mass, panels), inner(std::move(other)), options(o) {
+  Impl(const Body& body, const AffineMap& m, const VectorXd& mass, const VectorXd& node_drag,
+       std::vector<ProxyPanel> panels, const std::vector<std::unique_ptr<Obstacle>>& all,
+       std::unique_ptr<ConstraintSolver> other, const ContactOptions& o)
+      : map(m),
+        proxy(body, m, mass, panels),
+        drag_rate(node_drag.cwiseQuotient(mass)),
+        inner(std::move(other)),
+        options(o) {
     for (const auto& obstacle : all) {
       obstacles.push_back(obstacle.get());
       looked_at.emplace_back(Matrix3Xd::Zero(3, proxy.vertices()));
@@ -647,8 +652,14 @@ void ContactProjection::Impl::note_impulses() {
   memory.by_obstacle.setZero();
   for (const ContactRow& row : rows) {
     if (row.push == 0) continue;
-    const Vector3d impulse =
-        row.push * row.normal + row.drag + dt * (row.velocity_push * row.normal + row.velocity_drag);
+    // Accelerations are those of cloth that moves on, slowed down by drag; held cloth has no drag. [1 + c dt/2]
+    double rate = 0, all = 0;
+    for (const auto& [node, value] : row.nodes) {
+      rate += std::abs(value) * drag_rate[node];
+      all += std::abs(value);
+    }
+    const Vector3d impulse = (1 + 0.5 * dt * rate / all) * (row.push * row.normal + row.drag +
+                                                            dt * (row.velocity_push * row.normal + row.velocity_drag));
     for (const auto& [vertex, share] : row.vertices) {
       const ScalarRow& points = proxy.points(vertex);
       for (std::size_t k = 0; k < points.index.size(); ++k)
@@ -659,10 +670,11 @@ void ContactProjection::Impl::note_impulses() {
 }
 
 ContactProjection::ContactProjection(const Body& body, const AffineMap& map, const VectorXd& node_mass,
-                                     std::vector<ProxyPanel> panels,
+                                     const VectorXd& node_drag, std::vector<ProxyPanel> panels,
                                      const std::vector<std::unique_ptr<Obstacle>>& obstacles,
                                      std::unique_ptr<ConstraintSolver> inner, const ContactOptions& options)
-    : impl_(std::make_unique<Impl>(body, map, node_mass, std::move(panels), obstacles, std::move(inner), options)) {}
+    : impl_(std::make_unique<Impl>(body, map, node_mass, node_drag, std::move(panels), obstacles, std::move(inner),
+                                   options)) {}
 ContactProjection::~ContactProjection() = default;
 
 ProjectionReport ContactProjection::project(Nodes x, double t) {

@@ -39,9 +39,11 @@ struct ContactOptions {
 class ContactProjection final : public ConstraintSolver {
  public:
   // `inner`: the other constraints; null: none. Obstacles must outlive it.
+  // `node_drag` [kg/s]: steps take it as if nothing touched, which the reported forces make up for.
   ContactProjection(const Body& body, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                    std::vector<ProxyPanel> panels, const std::vector<std::unique_ptr<Obstacle>>& obstacles,
-                    std::unique_ptr<ConstraintSolver> inner, const ContactOptions& options = {});
+                    const Eigen::VectorXd& node_drag, std::vector<ProxyPanel> panels,
+                    const std::vector<std::unique_ptr<Obstacle>>& obstacles, std::unique_ptr<ConstraintSolver> inner,
+                    const ContactOptions& options = {});
   ~ContactProjection() override;
 
   ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) override;  // without contact

@@ -46,7 +46,7 @@ std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::str
 }
 
 std::unique_ptr<ContactProjection> with_contact(const Build& build, const AffineMap& map,
-                                                const Eigen::VectorXd& node_mass,
+                                                const Eigen::VectorXd& node_mass, const Eigen::VectorXd& node_drag,
                                                 std::unique_ptr<ConstraintSolver> inner) {
   const Scene& scene = build.scene;
   ContactOptions options;
@@ -66,7 +66,7 @@ std::unique_ptr<ContactProjection> with_contact(const Build& build, const Affine
         if ((pair.a == panel && pair.b == obstacle) || (pair.a == obstacle && pair.b == panel))
           options.friction(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(o)) = pair.friction;
       }
-  return std::make_unique<ContactProjection>(*build.model, map, node_mass, build.proxies, build.obstacles,
+  return std::make_unique<ContactProjection>(*build.model, map, node_mass, node_drag, build.proxies, build.obstacles,
                                              std::move(inner), options);
 }
 

@@ -16,7 +16,7 @@ std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::str
 
 // `inner`: the other constraints, null for none. Both outlive neither `build` nor `map`.
 std::unique_ptr<ContactProjection> with_contact(const Build& build, const AffineMap& map,
-                                                const Eigen::VectorXd& node_mass,
+                                                const Eigen::VectorXd& node_mass, const Eigen::VectorXd& node_drag,
                                                 std::unique_ptr<ConstraintSolver> inner);
 
 // "panel 'front' at (u, v) = (0.2, 0.4) and obstacle 'body'".

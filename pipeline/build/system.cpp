@@ -337,7 +337,8 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     system->projection->use_threads(dynamic.workers);
   }
   if (touches(scene)) {
-    auto contact = with_contact(build, *system->map, dynamic.node_mass, std::move(system->projection));
+    auto contact =
+        with_contact(build, *system->map, dynamic.node_mass, dynamic.node_drag, std::move(system->projection));
     contact->use_threads(dynamic.workers);
     system->contact = contact.get();
     system->projection = std::move(contact);

@@ -84,15 +84,11 @@ double contact_seconds(const ContactProjection& contact) {
 
 Json contact_json(const Build& build, const System& system, const RunResult& run, const StateMeasures& m) {
   if (!system.contact || !m.contact) return {{"max_penetration", nullptr}, {"min_distance", nullptr}};
-  const ContactProjection::Counts& counts = system.contact->counts();
-  const double steps = std::max(1.0, static_cast<double>(counts.steps));
   Json out = {{"max_penetration", m.contact->penetration},
               {"min_distance", nullptr},
               {"allowed", m.contact->allowed},
               {"contacts", run.last_projection.contacts},
-              {"sampled_points", system.contact->proxy().vertices()},
-              {"rounds_mean", static_cast<double>(counts.rounds) / steps},
-              {"sweeps_mean", static_cast<double>(counts.sweeps) / steps}};
+              {"sampled_points", system.contact->proxy().vertices()}};
   if (std::isfinite(m.contact->distance)) out["min_distance"] = m.contact->distance;
   if (!m.contact->where.empty()) out["deepest"] = m.contact->where;
   out["obstacles"] = Json::array();
@@ -219,8 +215,10 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   }
   if (system.contact) {
     const ContactProjection::Counts& counts = system.contact->counts();
-    counters["contact"] = {
-        {"seconds", contact_seconds(*system.contact)}, {"rounds", counts.rounds}, {"sweeps", counts.sweeps}};
+    counters["contact"] = {{"seconds", contact_seconds(*system.contact)},
+                           {"steps", counts.steps},
+                           {"rounds", counts.rounds},
+                           {"sweeps", counts.sweeps}};
   }
   counters["steps"] = {{"count", run.steps + run.redone_steps}};
   counters["time_step"] = {{"seconds", run.bound_seconds}};

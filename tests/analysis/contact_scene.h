@@ -105,8 +105,8 @@ struct ContactScene {
     std::vector<ProxyPanel> panels;
     panels.push_back({triangulate_cells(surface, trace_trims(surface), {options.divisions, options.divisions}),
                       options.half_thickness, options.fabric.friction});
-    contact = std::make_unique<ContactProjection>(model, map, system.node_mass, std::move(panels), obstacles,
-                                                  std::move(inner), options.contact);
+    contact = std::make_unique<ContactProjection>(model, map, system.node_mass, system.node_drag, std::move(panels),
+                                                  obstacles, std::move(inner), options.contact);
     system.projection = contact.get();
   }
 
