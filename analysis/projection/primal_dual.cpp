@@ -89,7 +89,8 @@ struct PrimalDual::Impl {
         memory(no_impulses(rows)) {
     for (const StrainRow& row : rows.strain)
       if (!(row.stiffness > 0)) throw SolverError("strain limit: a row has no stiffness");
-    for (Eigen::VectorXd* v : {&guess, &force, &rhs, &solution, &trial, &held, &part}) v->resize(3 * map.nodes());
+    for (Eigen::VectorXd* v : {&guess, &force, &rhs, &solution, &trial, &held, &part, &answer})
+      v->resize(3 * map.nodes());
   }
 
   int strains() const { return static_cast<int>(rows.strain.size()); }
@@ -138,8 +139,8 @@ struct PrimalDual::Impl {
   double merit(const Eigen::Ref<const Eigen::VectorXd>& x);
   double limit_energy();
   const Eigen::VectorXd& end(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> v, double t,
-                             const Eigen::Ref<const Eigen::VectorXd>& start, double dt, const Eigen::VectorXd& from,
-                             bool goes_on, ConstraintForces& forces, ProjectionReport& report);
+                             const Eigen::Ref<const Eigen::VectorXd>& start, double dt, bool goes_on,
+                             ConstraintForces& forces, ProjectionReport& report);
 };
 
 // y, C and how far from the limits and pins they are.
@@ -401,7 +402,7 @@ ProjectionReport PrimalDual::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eige
   s.rounding = place_rounding * std::sqrt(size) / tau2;
   for (int k = 0; k < s.mass.size(); ++k) s.held.segment<3>(3 * k) *= tau2 / s.mass[k];
   s.half_memory = s.memory;
-  x = s.end(x, v, t, start, dt, 2 * x - dt * v - start, false, forces, report);
+  x = s.end(x, v, t, start, dt, false, forces, report);
   return report;
 }
 
@@ -412,19 +413,19 @@ ProjectionReport PrimalDual::again(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eig
   if (!s.has_matrix || s.mass.size() == 0) return step(x, v, t, start, dt, forces);
   ProjectionReport report;
   s.memory = s.half_memory;
-  x = s.end(x, v, t, start, dt, s.answer, true, forces, report);
+  x = s.end(x, v, t, start, dt, true, forces, report);
   return report;
 }
 
-// The end of a step from the candidate x, v, by Newton's method from `from`. (The header's equation; `held` is its
-// first sum.)
+// The end of a step from the candidate x, v; `goes_on`: by Newton's method from the last answer. (The header's
+// equation; `held` is its first sum.)
 const Eigen::VectorXd& PrimalDual::Impl::end(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::Ref<Eigen::VectorXd> v,
                                              double t, const Eigen::Ref<const Eigen::VectorXd>& start, double dt,
-                                             const Eigen::VectorXd& from, bool goes_on, ConstraintForces& forces,
-                                             ProjectionReport& report) {
-  guess = x - held;
+                                             bool goes_on, ConstraintForces& forces, ProjectionReport& report) {
   v -= 2 / dt * x;
-  if (!goes_on) answer = from;
+  guess = x - held;
+  // x0 + dt v0: a better start for Newton's method than forces that rows don't resolve.
+  if (!goes_on) answer = -start - dt * v;
   at(t);
   bool solved = iterate(answer, report, goes_on);
   if (!solved) {

@@ -355,7 +355,7 @@ std::string head_text(const std::filesystem::path& path, const std::filesystem::
       path.filename().string(), path_from(scene, path));
   if (!out.without.empty()) {
     text += fmt::format(
-        "# Seams and obstacles are not simulated by this version. Each panel drapes alone:\n"
+        "# Seams are not simulated by this version. Without them each panel drapes alone:\n"
         "#   toile drape scene.toml{}\n",
         out.without);
   }

@@ -62,6 +62,7 @@ size = [1, 1, 1]
 a = "a"
 b = "body"
 friction = 0.3
+[contact]
 [strain_limit]
 {1}
 [load]
