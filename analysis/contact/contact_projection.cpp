@@ -29,6 +29,7 @@ constexpr double stiffness = 100;            // a contact yields by 1 / this of 
 constexpr double deep = 0.1;                 // of the offset: a start nearer than this is moved off slowly
 constexpr double normal_tolerance = 0.02;    // of the offset
 constexpr double tangent_tolerance = 0.002;  // of acceleration dt^2, and of acceleration dt for velocities
+constexpr double force_tolerance = 0.01;        // of the normal impulse, if that allows more
 constexpr double slip = 5;                   // times that an anchor is left behind
 constexpr double inner_tolerance = 0.1;      // of these, within a round
 constexpr double least_offset = 1e-5;        // m, that displacements are compared with
@@ -494,8 +495,9 @@ double ContactProjection::Impl::sweep(Nodes x) {
     push(row, change, x);
     push(row, change, pushed);
     const double before = largest;
+    const double slip_allowed = std::max(least_slip, force_tolerance * row.weight * row.push);
     largest = std::max({largest, std::abs(more) * row.weight / (normal_tolerance * touch(row)),
-                        (row.drag - drag_before).norm() * row.weight / least_slip});
+                        (row.drag - drag_before).norm() * row.weight / slip_allowed});
     if (largest > before) worst = static_cast<int>(&row - rows.data());
   }
   return largest;
