@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geometry/nurbs_surface.h"
+#include "geometry/triangle_mesh.h"
 #include "geometry/trimmed_surface.h"
 #include "trimming/constraint_points.h"
 #include "trimming/triangulation.h"
@@ -38,11 +39,18 @@ struct FramePanel {
   std::vector<Eigen::Vector4d> point_stress;
 };
 
+// What the cloth meets, SI, scene axes.
+struct FrameBody {
+  std::string name;
+  TriangleMesh mesh;
+};
+
 struct Frame {
   int number = 0;   // 0, 1, 2, ...
   double time = 0;  // s
   std::span<const FramePanel> panels;
   Eigen::Vector3d up{0, 0, 1};  // unit vector
+  std::span<const FrameBody> bodies = {};
 };
 
 // Frames arrive once, in order (std::logic_error otherwise). A failed write throws OutputError; files appear whole or

@@ -45,6 +45,9 @@ class MeshObstacle : public Obstacle {
   std::span<const Segment> sharp_edges() const override { return sharp_edges_; }
   std::span<const Eigen::Vector3d> sharp_vertices() const override { return sharp_vertices_; }
 
+  TriangleMesh picture(const Eigen::AlignedBox3d&) const override {
+    return {(place_.linear() * now_).colwise() + place_.translation(), triangles_};
+  }
   // Whether no edge has one face only.
   bool closed() const override { return closed_; }
 

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
+
+#include "geometry/triangle_mesh.h"
 
 namespace toile {
 
@@ -55,6 +58,9 @@ class Obstacle {
   // Of the present shape: where two faces meet at more than 25 degrees from the outside, and where such edges end.
   virtual std::span<const Segment> sharp_edges() const = 0;
   virtual std::span<const Eigen::Vector3d> sharp_vertices() const = 0;
+
+  // The present shape, for pictures: round shapes by chords, endless ones as far as `around`.
+  virtual TriangleMesh picture(const Eigen::AlignedBox3d& around) const = 0;
 
  private:
   ObstacleOptions options_;

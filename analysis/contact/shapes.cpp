@@ -47,6 +47,11 @@ class RigidObstacle : public Obstacle {
   Vector3d carry(const Vector3d& p, int) const override {
     return motion_ ? Vector3d(pose_ * (before_.inverse() * p)) : p;
   }
+  TriangleMesh picture(const Eigen::AlignedBox3d& around) const override {
+    TriangleMesh mesh = own_picture(pose_.inverse() * around.center(), around.diagonal().norm());
+    mesh.vertices = (pose_.linear() * mesh.vertices).colwise() + pose_.translation();
+    return mesh;
+  }
   std::span<const Segment> sharp_edges() const override { return edges_; }
   std::span<const Vector3d> sharp_vertices() const override { return vertices_; }
 
@@ -59,6 +64,8 @@ class RigidObstacle : public Obstacle {
 
  private:
   virtual Local local_nearest(const Vector3d& p) const = 0;
+  // In its own axes; the scene lies around `middle`, no larger than `size`.
+  virtual TriangleMesh own_picture(const Vector3d& middle, double size) const = 0;
   void place_features() {
     edges_.clear();
     vertices_.clear();
@@ -86,6 +93,31 @@ Vector3d unit_or(const Vector3d& d, const Vector3d& otherwise) {
   return length > 0 ? Vector3d(d / length) : otherwise;
 }
 
+// A grid of points, closed around in its first direction where `round`, as triangles that turn left seen along
+// du x dv.
+TriangleMesh grid_mesh(int around, int along, bool round, const std::function<Vector3d(int, int)>& at) {
+  TriangleMesh mesh;
+  mesh.vertices.resize(3, around * along);
+  for (int j = 0; j < along; ++j)
+    for (int i = 0; i < around; ++i) mesh.vertices.col(i + around * j) = at(i, j);
+  for (int j = 0; j + 1 < along; ++j)
+    for (int i = 0; i < (round ? around : around - 1); ++i) {
+      const int a = i + around * j, b = (i + 1) % around + around * j;
+      mesh.triangles.push_back({a, b, b + around});
+      mesh.triangles.push_back({a, b + around, a + around});
+    }
+  return mesh;
+}
+// A meridian (r, z), from below to above, turned about z.
+TriangleMesh revolved_mesh(const std::vector<Vector2d>& meridian) {
+  constexpr int around = 64;
+  return grid_mesh(around, static_cast<int>(meridian.size()), true, [&](int i, int j) -> Vector3d {
+    const double angle = 2 * std::numbers::pi * i / around;
+    const Vector2d& m = meridian[static_cast<std::size_t>(j)];
+    return {m.x() * std::cos(angle), m.x() * std::sin(angle), m.y()};
+  });
+}
+
 class PlaneObstacle final : public RigidObstacle {
  public:
   PlaneObstacle(const PlaneShape& s, ObstacleOptions o, RigidMotion m)
@@ -93,6 +125,13 @@ class PlaneObstacle final : public RigidObstacle {
 
  private:
   Local local_nearest(const Vector3d& p) const override { return {{p.x(), p.y(), 0}, Vector3d::UnitZ(), p.z(), 0}; }
+  TriangleMesh own_picture(const Vector3d& middle, double size) const override {
+    constexpr int points = 33;
+    return grid_mesh(points, points, false, [&](int i, int j) -> Vector3d {
+      const auto place = [&](int k) { return size * (2.0 * k / (points - 1) - 1); };
+      return {middle.x() + place(i), middle.y() + place(j), 0};
+    });
+  }
 };
 
 // All that is within a radius of a line from the origin up to `length`; a sphere where that is 0.
@@ -106,6 +145,16 @@ class CapsuleObstacle final : public RigidObstacle {
     const Vector3d axis(0, 0, std::clamp(p.z(), 0.0, length_));
     const Vector3d n = unit_or(p - axis, Vector3d::UnitX());
     return {axis + r_ * n, n, (p - axis).norm() - r_, p.z() < 0 ? 1 : p.z() > length_ ? 2 : 0};
+  }
+  TriangleMesh own_picture(const Vector3d&, double) const override {
+    constexpr int parts = 16;  // of each half of the meridian
+    std::vector<Vector2d> meridian;
+    for (int j = 0; j <= 2 * parts + 1; ++j) {
+      const bool lower = j <= parts;
+      const double angle = std::numbers::pi / 2 * ((lower ? j : j - 1) / static_cast<double>(parts) - 1);
+      meridian.emplace_back(r_ * std::cos(angle), r_ * std::sin(angle) + (lower ? 0 : length_));
+    }
+    return revolved_mesh(meridian);
   }
   double length_, r_;
 };
@@ -158,6 +207,12 @@ class RevolvedObstacle final : public RigidObstacle {
     const auto raise = [&](const Vector2d& m) -> Vector3d { return m.x() * out + m.y() * Vector3d::UnitZ(); };
     return {raise(point), raise(n), inside ? -best : best, feature};
   }
+  TriangleMesh own_picture(const Vector3d&, double) const override {
+    // Corners twice, so that light doesn't round them off.
+    std::vector<Vector2d> meridian;
+    for (const Vector2d& corner : meridian_) meridian.insert(meridian.end(), 2, corner);
+    return revolved_mesh(meridian);
+  }
   std::vector<Vector2d> meridian_;
 };
 
@@ -199,6 +254,25 @@ class BoxObstacle final : public RigidObstacle {
     for (int axis = 0; axis < 3; ++axis)
       if (away[axis] != 0) feature += axis_feature(axis, away[axis]);
     return {within, away.normalized(), away.norm(), feature};
+  }
+  TriangleMesh own_picture(const Vector3d&, double) const override {
+    TriangleMesh mesh;
+    mesh.vertices.resize(3, 24);
+    for (int face = 0; face < 6; ++face) {
+      const int axis = face % 3;
+      const double side = face < 3 ? -1 : 1;
+      for (int k = 0; k < 4; ++k) {
+        const int u = k == 1 || k == 2 ? 1 : -1, v = k >= 2 ? 1 : -1;
+        Vector3d corner;
+        corner[axis] = side * half_[axis];
+        corner[(axis + 1) % 3] = u * half_[(axis + 1) % 3];
+        corner[(axis + 2) % 3] = side * v * half_[(axis + 2) % 3];
+        mesh.vertices.col(4 * face + k) = corner;
+      }
+      mesh.triangles.push_back({4 * face, 4 * face + 1, 4 * face + 2});
+      mesh.triangles.push_back({4 * face, 4 * face + 2, 4 * face + 3});
+    }
+    return mesh;
   }
   // Faces, edges and vertices by the sides that they lie on.
   static int axis_feature(int axis, double side) {

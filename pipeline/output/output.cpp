@@ -238,7 +238,11 @@ std::string FrameWriter::preview(const System& system, const Eigen::VectorXd& q)
   PreviewOptions options;
   options.up = up(impl_->build.scene);
   options.title = impl_->build.scene.name;
-  return preview_png({0, 0, shown.panels}, options);
+  Eigen::AlignedBox3d cloth;
+  for (Eigen::Index i = 0; i < q.size(); i += 3) cloth.extend(Eigen::Vector3d(q.segment<3>(i)));
+  std::vector<FrameBody> bodies;
+  for (const auto& obstacle : impl_->build.obstacles) bodies.push_back({obstacle->name(), obstacle->picture(cloth)});
+  return preview_png({.panels = shown.panels, .bodies = bodies}, options);
 }
 
 void prepare_directory(const std::filesystem::path& directory, bool overwrite) {

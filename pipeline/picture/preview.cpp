@@ -66,9 +66,9 @@ void for_all(int count, const std::function<void(int)>& work) {
 
 // ---- the cloth -----------------------------------------------------------------------------------------------------
 
-struct Triangle {
+struct Face {
   std::array<int, 3> vertex;
-  int panel = 0;
+  int panel = 0;                  // -1: of a body
   std::array<bool, 3> border{};   // edge opposite to vertex k belongs to no other triangle
   Vector2f metres_per_parameter;  // distance in space per change of u and v at right angles to the iso-lines
 };
@@ -77,11 +77,12 @@ struct Cloth {
   std::vector<Vector3f> x, normal;
   std::vector<Vector2f> uv;
   std::vector<float> value;
-  std::vector<Triangle> triangles;
+  std::vector<Face> triangles;
   std::vector<std::array<std::vector<float>, 2>> knots;  // per panel
   bool valued = true;
   Vector3d centre;
   float radius = 0;
+  std::vector<Vector3f> framed;  // what the picture shows whole: the cloth, and bodies next to it
 };
 
 void mark_borders(Cloth& cloth, std::size_t first) {
@@ -123,7 +124,7 @@ Cloth gather(const Frame& frame) {
     cloth.valued = cloth.valued && strain.size() == panel.triangles->uv.size();
     for (const Vector3d& e : strain) cloth.value.push_back(static_cast<float>(std::max(e[0], e[1])));
     for (const auto& t : panel.triangles->triangles) {
-      Triangle triangle;
+      Face triangle;
       for (std::size_t k = 0; k < 3; ++k) triangle.vertex[k] = static_cast<int>(first_vertex) + t[k];
       triangle.panel = static_cast<int>(cloth.knots.size());
       cloth.triangles.push_back(triangle);
@@ -139,11 +140,39 @@ Cloth gather(const Frame& frame) {
     if (!std::isfinite(value)) throw OutputError("preview: the frame's strains are not finite");
   if (cloth.triangles.empty()) throw OutputError("preview: the frame has no cloth to draw");
   if (!(box.sizes().norm() < 1e30)) throw OutputError("preview: the frame's positions are not finite");
+  const std::size_t of_cloth = places.size();
+  Eigen::AlignedBox3d near = box;  // a body is framed as far as it is beside the cloth
+  near.min() -= 0.15 * box.sizes();
+  near.max() += 0.15 * box.sizes();
+  for (const FrameBody& body : frame.bodies) {
+    const std::size_t first = places.size();
+    Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, body.mesh.vertices.cols());
+    for (const auto& t : body.mesh.triangles) {
+      const auto at = [&](int k) -> Vector3d { return body.mesh.vertices.col(t[static_cast<std::size_t>(k)]); };
+      const Vector3d normal = (at(1) - at(0)).cross(at(2) - at(0));
+      Face face;
+      face.panel = -1;
+      for (std::size_t k = 0; k < 3; ++k) {
+        face.vertex[k] = static_cast<int>(first) + t[k];
+        normals.col(t[k]) += normal;
+      }
+      cloth.triangles.push_back(face);
+    }
+    for (Eigen::Index k = 0; k < normals.cols(); ++k) {
+      places.push_back(body.mesh.vertices.col(k));
+      cloth.normal.push_back(normals.col(k).stableNormalized().cast<float>());
+      cloth.uv.emplace_back(0.0f, 0.0f);
+    }
+  }
   // Centred, so that single precision serves.
   cloth.centre = box.center();
   cloth.radius = static_cast<float>(std::max(box.sizes().norm() / 2, 1e-12));
-  for (const Vector3d& x : places) cloth.x.push_back((x - cloth.centre).cast<float>());
-  for (Triangle& triangle : cloth.triangles) {
+  for (const Vector3d& x : places) {
+    cloth.x.push_back((x - cloth.centre).cast<float>());
+    if (cloth.x.size() <= of_cloth || near.contains(x)) cloth.framed.push_back(cloth.x.back());
+  }
+  for (Face& triangle : cloth.triangles) {
+    if (triangle.panel < 0) continue;
     const auto [a, b, c] = triangle.vertex;
     const auto at = [](int k) { return static_cast<std::size_t>(k); };
     // Gradients of u and v in the triangle's plane.
@@ -180,7 +209,7 @@ class Rays {
                                                                  3 * sizeof(unsigned), cloth.triangles.size()));
     if (!x || !index) throw OutputError("preview: not enough memory for the picture");
     for (const Vector3f& p : cloth.x) x = std::copy_n(p.data(), 3, x);
-    for (const Triangle& t : cloth.triangles)
+    for (const Face& t : cloth.triangles)
       for (const int vertex : t.vertex) *index++ = static_cast<unsigned>(vertex);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene_, geometry);
@@ -333,7 +362,8 @@ Vector3f view_direction(const Cloth& cloth, const PreviewOptions& options, const
       const float azimuth = 10 * degree * static_cast<float>(k);
       const Vector3f d = direction(azimuth, elevation);
       float area = 0;
-      for (const Triangle& t : cloth.triangles) {
+      for (const Face& t : cloth.triangles) {
+        if (t.panel < 0) continue;
         const auto at = [&](int corner) {
           return cloth.x[static_cast<std::size_t>(t.vertex[static_cast<std::size_t>(corner)])];
         };
@@ -365,7 +395,7 @@ Camera fit_camera(const Cloth& cloth, const Vector3f& back, const Vector3f& up, 
   camera.pixel = half_angle_tangent / std::max(half_x, half_y);
   const float tx = camera.pixel * half_x, ty = camera.pixel * half_y;
   float r = -infinity, l = -infinity, t = -infinity, b = -infinity, nearest = -infinity;
-  for (const Vector3f& x : cloth.x) {
+  for (const Vector3f& x : cloth.framed) {
     const float px = x.dot(camera.right), py = x.dot(camera.up), pz = x.dot(back);
     r = std::max(r, px + tx * pz), l = std::max(l, -px + tx * pz);
     t = std::max(t, py + ty * pz), b = std::max(b, -py + ty * pz);
@@ -450,7 +480,7 @@ struct Shader {
   Vector3f key, up;
 
   Vector3f operator()(const Hit& hit, const Vector3f& direction) const {
-    const Triangle& triangle = cloth.triangles[hit.triangle];
+    const Face& triangle = cloth.triangles[hit.triangle];
     const std::array<float, 3> weight{1 - hit.b - hit.c, hit.b, hit.c};
     std::array<std::size_t, 3> at;
     for (std::size_t k = 0; k < 3; ++k) at[k] = static_cast<std::size_t>(triangle.vertex[k]);
@@ -465,17 +495,20 @@ struct Shader {
       uv += weight[k] * cloth.uv[at[k]];
       seen.sky += weight[k] * light[at[k]][back].sky;
       seen.key += weight[k] * light[at[k]][back].key;
-      if (cloth.valued) value += weight[k] * cloth.value[at[k]];
+      if (cloth.valued && triangle.panel >= 0) value += weight[k] * cloth.value[at[k]];
     }
     normal = (back ? -normal : normal).stableNormalized();
     const float facing = std::max(0.0f, -normal.dot(direction));
     const float hemisphere = 0.5f + 0.5f * normal.dot(up);
     const float shade =
         seen.sky * (0.36f + 0.16f * hemisphere) + 0.50f * seen.key * std::max(0.0f, normal.dot(key)) + 0.12f * facing;
-    Vector3f colour = cloth.valued ? scale.colour(value) : Vector3f(0.62f, 0.64f, 0.68f);
+    const Vector3f grey(0.62f, 0.64f, 0.68f), skin(0.80f, 0.76f, 0.72f);
+    Vector3f colour = triangle.panel < 0 ? skin : cloth.valued ? scale.colour(value) : grey;
     colour = (back ? 0.92f : 1.0f) * shade * colour;
     colour +=
         Vector3f::Constant(0.05f * std::pow(1 - facing, 3.0f) * seen.sky);  // the sheen of cloth seen at a low angle
+
+    if (triangle.panel < 0) return colour;
 
     // Lines have constant width on the screen where the cloth faces it.
     const float pixel = camera.pixel * hit.distance * -direction.dot(camera.back);
@@ -533,7 +566,7 @@ std::string preview_png(const Frame& frame, const PreviewOptions& options) {
       for (int x = 0; x < options.width; ++x) {
         const Hit hit =
             rays.nearest(camera.place, camera.direction(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
-        if (!hit) continue;
+        if (!hit || cloth.triangles[hit.triangle].panel < 0) continue;
         const auto& v = cloth.triangles[hit.triangle].vertex;
         const auto value = [&](int k) { return cloth.value[static_cast<std::size_t>(v[static_cast<std::size_t>(k)])]; };
         rows[static_cast<std::size_t>(y)].push_back((1 - hit.b - hit.c) * value(0) + hit.b * value(1) +

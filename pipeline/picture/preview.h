@@ -22,9 +22,10 @@ struct PreviewOptions {
 // False where the program was built without Embree or stb (TOILE_PREVIEW); preview_png then throws OutputError.
 bool preview_available();
 
-// PNG bytes. Colour is the larger of weft and warp strain (FrameFields::strain; grey where that is empty), the scale
-// (ColourScale) stands beside it. Trims and knot lines are drawn thin.
-// The same frame gives the same bytes on any number of threads. Throws OutputError where there is nothing to draw.
+// PNG bytes. Bodies are shown plain beside the cloth. Colour is the larger of weft and warp strain
+// (FrameFields::strain; grey where that is empty), the scale (ColourScale) stands beside it. Trims and knot lines are
+// drawn thin. The same frame gives the same bytes on any number of threads. Throws OutputError where there is nothing
+// to draw.
 std::string preview_png(const Frame& frame, const PreviewOptions& options = {});
 
 }  // namespace toile
