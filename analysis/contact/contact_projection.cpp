@@ -277,7 +277,7 @@ void ContactProjection::Impl::look_at_sharp(int index) {
     features.edges.refit(boxes(edges));
     features.vertices.refit(boxes(vertices));
   }
-  const double own = obstacle.thickness() + options.largest_chord;
+  const double round = obstacle.sharp_radius(), own = obstacle.thickness() + round + options.largest_chord;
   const Matrix3Xd& seen = looked_at[static_cast<std::size_t>(index)];
   const VectorXd& free = clear[static_cast<std::size_t>(index)];
   // The cloth within a distance of a vertex meets nothing.
@@ -304,10 +304,11 @@ void ContactProjection::Impl::look_at_sharp(int index) {
       chord = std::max(chord, proxy.chord_error(vertex, at, normal));
     }
     row.chord = std::min(chord, options.largest_chord);
-    row.offset = cloth + obstacle.thickness() + row.chord;
+    row.offset = cloth + obstacle.thickness() + round + row.chord;
     if (normal.dot(now - target) - row.offset > std::max(row.offset, least_offset)) return;
     const auto before = obstacle.nearest(start, HUGE_VAL);
-    if (!before || before->distance < 0 || !leads_out(obstacle, target, normal, std::max(row.offset, least_offset)))
+    if (!before || before->distance < 0 ||
+        !leads_out(obstacle, target + round * normal, normal, std::max(row.offset - round, least_offset)))
       return;
     row.distance = row.offset;  // feature contacts hold what they have
     row.anchor = start;

@@ -59,6 +59,9 @@ class Obstacle {
   virtual std::span<const Segment> sharp_edges() const = 0;
   virtual std::span<const Eigen::Vector3d> sharp_vertices() const = 0;
 
+  // Of round features, whose surface is this far from the listed lines and points [m].
+  virtual double sharp_radius() const { return 0; }
+
   // The present shape, for pictures: round shapes by chords, endless ones as far as `around`.
   virtual TriangleMesh picture(const Eigen::AlignedBox3d& around) const = 0;
 

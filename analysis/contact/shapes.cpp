@@ -17,6 +17,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr int rim_chords = 128;
+constexpr double thin = 0.02;  // m: what is rounder than this passes between the cloth's sampled points
 
 struct Local {  // a SurfacePoint in the shape's own axes
   Vector3d point, normal;
@@ -138,7 +139,13 @@ class PlaneObstacle final : public RigidObstacle {
 class CapsuleObstacle final : public RigidObstacle {
  public:
   CapsuleObstacle(const CapsuleShape& s, ObstacleOptions o, RigidMotion m)
-      : RigidObstacle(std::move(o), along(s.from, s.to), std::move(m)), length_((s.to - s.from).norm()), r_(s.radius) {}
+      : RigidObstacle(std::move(o), along(s.from, s.to), std::move(m)), length_((s.to - s.from).norm()), r_(s.radius) {
+    if (r_ > thin) return;
+    const Vector3d end(0, 0, length_);
+    set_features(length_ > 0 ? std::vector<Segment>{{Vector3d::Zero(), end}} : std::vector<Segment>{},
+                 {Vector3d::Zero(), end});
+  }
+  double sharp_radius() const override { return r_; }
 
  private:
   Local local_nearest(const Vector3d& p) const override {

@@ -106,6 +106,20 @@ TEST(Contact, ADropAtTenMetresASecondStaysOnAThinPlate) {
   EXPECT_GT(lowest, 0.5e-3);
 }
 
+// A rod thinner than the distance of the sampled points.
+TEST(Contact, AThinRodCarriesCloth) {
+  ContactSceneOptions o;
+  o.size = 0.4;
+  o.limit = Limit::none;
+  o.fabric = soft(0.35);
+  o.shift = {-0.21, -0.2, 0.004};
+  ContactScene scene(o, one(CapsuleShape{{0, -0.3, 0}, {0, 0.3, 0}, 1e-3}, 0.8));
+  scene.run(2e-3, 0.4);
+  EXPECT_GT(scene.force(0).z(), 0.5 * scene.weight());
+  EXPECT_LT(scene.depth(), 1e-4);
+  EXPECT_LT(scene.at(0, 0.2).z(), -0.05);  // hangs over it
+}
+
 // Cloth that starts 20 mm inside is outside in a second, and is not thrown off.
 TEST(Contact, AStartInsideIsPushedOutSlowly) {
   ContactSceneOptions o;
