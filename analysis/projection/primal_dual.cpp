@@ -215,16 +215,9 @@ void PrimalDual::Impl::soften_places(const Eigen::Ref<const Eigen::VectorXd>& x)
   for (int p = 0; p < places(); ++p) place_compliance[p] = place_softness * gram_diagonal[strains() + p] * tau * tau;
   if (!smooth || places() == 0) return;
   const BlockMatrix& hessian = smooth->hessian(x, true);
-  const CompressedRows& d = composed.free;
-  for (int p = 0; p < places(); ++p) {
-    double give = 0;
-    for (int e = d.start[strains() + p]; e < d.start[strains() + p + 1]; ++e) {
-      const double* const own = hessian.block(hessian.pattern().first_slot(d.column[e]));
-      const double stiff = mass[d.column[e]] / (tau * tau) + std::max({own[0], own[4], own[8]});
-      give += d.value[e] * d.value[e] / stiff;
-    }
-    place_compliance[p] = place_softness * give;
-  }
+  for (int p = 0; p < places(); ++p)
+    place_compliance[p] =
+        place_softness * own_compliance(composed.free, strains() + p, 1 / (tau * tau) * mass, hessian);
 }
 
 // By `slope`, friction and the tensions.

@@ -106,7 +106,7 @@ void RowMatrix::gather(const Eigen::Ref<const Eigen::VectorXd>& v, Eigen::Matrix
   });
 }
 
-bool RowMatrix::factorise(const BlockMatrix* added) {
+void RowMatrix::fill(const BlockMatrix* added) {
   std::fill(values_.begin(), values_.end(), 0.0);
   // Column b of the block that many below a node's own, its row 0 (in the own block, rows from b on).
   const auto column = [&](int node, int lower, int b) {
@@ -142,7 +142,29 @@ bool RowMatrix::factorise(const BlockMatrix* added) {
         for (int a = added_below_[slot] == 0 ? b : 0; a < 3; ++a) to[a] += block[3 * a + b];
       }
     }
+}
+
+bool RowMatrix::factorise(const BlockMatrix* added) {
+  fill(added);
+  positive_ = true;
   return factor_->factorise(values_);
+}
+
+std::optional<int> RowMatrix::factorise_any(const BlockMatrix* added) {
+  if (factorise(added)) return 0;
+  if (!indefinite_) indefinite_ = std::make_unique<IndefiniteFactor>(pattern_);
+  positive_ = false;
+  return indefinite_->factorise(values_);
+}
+
+double own_compliance(const CompressedRows& rows, int row, const Eigen::VectorXd& stiffness,
+                      const BlockMatrix& blocks) {
+  double sum = 0;
+  for (int e = rows.start[row]; e < rows.start[row + 1]; ++e) {
+    const double* const own = blocks.block(blocks.pattern().first_slot(rows.column[e]));
+    sum += rows.value[e] * rows.value[e] / (stiffness[rows.column[e]] + std::max({own[0], own[4], own[8]}));
+  }
+  return sum;
 }
 
 double RowMatrix::stiffening() const {

@@ -5,11 +5,13 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "analysis/constraint/composed_rows.h"
 #include "analysis/linear/block_matrix.h"
 #include "analysis/linear/cholesky.h"
+#include "analysis/linear/indefinite_factor.h"
 #include "analysis/parallel/workers.h"
 
 namespace toile {
@@ -44,7 +46,11 @@ class RowMatrix {
 
   // By a factor of the matrix as it is now: false where it is not positive. Then any number of solutions.
   bool factorise(const BlockMatrix* added = nullptr);
-  void solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) { factor_->solve(rhs, x); }
+  // The same where it need not be positive: how many eigenvalues are negative; nothing where there is no factor.
+  std::optional<int> factorise_any(const BlockMatrix* added = nullptr);
+  void solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) {
+    positive_ ? factor_->solve(rhs, x) : indefinite_->solve(rhs, x);
+  }
   // Conjugate gradients from x on with the nodes' own blocks as preconditioner, until the residual in the
   // preconditioner's norm is `tolerance` of the right side's; false where that takes more than `most` iterations. What
   // is left has no sum where rows feel no translation, so that momentum is kept exactly.
@@ -57,6 +63,7 @@ class RowMatrix {
 
  private:
   void make_pattern(const BlockPattern* added);
+  void fill(const BlockMatrix* added);
   void apply(const Eigen::VectorXd& v, Eigen::VectorXd& out);
   void invert_nodes();
 
@@ -68,12 +75,18 @@ class RowMatrix {
   // How many blocks below the diagonal's: of each pair of a row's entries (first <= second), of each block of `added`.
   std::vector<int> below_, added_below_;
   std::unique_ptr<Cholesky> factor_;
-  bool free_ = true;  // no row feels a translation
+  std::unique_ptr<IndefiniteFactor> indefinite_;  // made where it is needed
+  bool positive_ = true;                          // which of them holds the matrix
+  bool free_ = true;                              // no row feels a translation
   Workers* workers_ = nullptr;
 
   std::vector<SymmetricBlock> inverse_;  // of each node's own block
   Eigen::VectorXd residual_, scaled_, direction_, image_;
   Eigen::Matrix3Xd of_row_;
 };
+
+// How far a row gives under a unit force if its nodes move each by itself, on `stiffness` of the node [N/m] and the
+// largest diagonal entry of its block [m/N].
+double own_compliance(const CompressedRows& rows, int row, const Eigen::VectorXd& stiffness, const BlockMatrix& blocks);
 
 }  // namespace toile

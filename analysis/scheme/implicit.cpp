@@ -7,103 +7,24 @@
 #include <vector>
 
 #include "analysis/projection/primal_dual.h"
-#include "analysis/scheme/reduced_matrix.h"
+#include "analysis/scheme/node_forces.h"
 #include "geometry/clock.h"
 
 namespace toile {
 namespace {
 
 using Vector = Eigen::VectorXd;
-using Places = Eigen::Ref<const Vector>;
 
 // TR-BDF2 with the one gamma whose stages have the same matrix.
 constexpr double gamma = 2 - std::numbers::sqrt2;
 constexpr double c1 = 1 / (gamma * (2 - gamma)), c0 = c1 - 1;
-
-BlockPattern couplings_of(const MechanicalSystem& system) {
-  std::vector<std::vector<int>> groups;
-  for (const Potential* potential : system.potentials)
-    for (std::vector<int>& group : potential->couplings()) groups.push_back(std::move(group));
-  return BlockPattern(system.map->control_points(), groups);
-}
-
-// Elastic energy, loads and drag over nodes, at one time.
-class Smooth final : public SmoothEnergy {
- public:
-  explicit Smooth(const MechanicalSystem& system)
-      : system_(system),
-        pattern_(couplings_of(system)),
-        reduced_(pattern_, *system.map),
-        points_(pattern_),
-        nodes_(reduced_.pattern()),
-        q_(3 * system.map->control_points()),
-        f_(q_.size()),
-        of_nodes_(3 * system.map->nodes()) {
-    for (const Potential* potential : system.potentials) slots_.push_back(potential->slots(pattern_));
-  }
-  const BlockPattern& pattern() const { return reduced_.pattern(); }
-
-  // Drag sees the velocity (x - from) / beta.
-  void at(double t, const Vector& from, double beta) {
-    system_.map->fixed_places(t, fixed_places_);
-    from_ = from;
-    beta_ = beta;
-  }
-  // Forces on control points without drag, and what the potentials store.
-  Elastic force(const Places& x, Vector& q, Vector& f) {
-    system_.map->expand(x, fixed_places_, q, system_.workers);
-    const Elastic elastic = internal_force(system_.potentials, q, f, system_.workers);
-    f += system_.loads.force;
-    return elastic;
-  }
-
-  double value(const Places& x) override {
-    double sum = force(x, q_, f_).total() - system_.loads.force.dot(q_);
-    for (int k = 0; k < system_.map->nodes(); ++k)
-      sum += 0.5 * system_.node_drag[k] * beta_ * (velocity(x, k) - system_.loads.wind).squaredNorm();
-    return sum;
-  }
-  void add_gradient(const Places& x, Vector& g) override {
-    force(x, q_, f_);
-    system_.map->reduce(f_, of_nodes_, system_.workers);
-    g -= of_nodes_;
-    for (int k = 0; k < system_.map->nodes(); ++k)
-      g.segment<3>(3 * k) += system_.node_drag[k] * (velocity(x, k) - system_.loads.wind);
-  }
-  const BlockMatrix& hessian(const Places& x, bool positive) override {
-    system_.map->expand(x, fixed_places_, q_, system_.workers);
-    points_.set_zero();
-    for (std::size_t k = 0; k < slots_.size(); ++k)
-      system_.potentials[k]->add_hessian(q_, positive ? TangentKind::positive : TangentKind::exact, slots_[k], points_,
-                                         system_.workers);
-    reduced_.reduce(points_, nodes_);
-    for (int k = 0; k < system_.map->nodes(); ++k)
-      for (int a = 0; a < 3; ++a) nodes_.block(pattern().first_slot(k))[4 * a] += system_.node_drag[k] / beta_;
-    return nodes_;
-  }
-  const Eigen::Matrix3Xd& fixed_places() const { return fixed_places_; }
-
- private:
-  Eigen::Vector3d velocity(const Places& x, int k) const {
-    return (x.segment<3>(3 * k) - from_.segment<3>(3 * k)) / beta_;
-  }
-
-  const MechanicalSystem& system_;
-  BlockPattern pattern_;
-  ReducedMatrix reduced_;
-  BlockMatrix points_, nodes_;
-  std::vector<std::vector<int>> slots_;
-  Eigen::Matrix3Xd fixed_places_;
-  Vector q_, f_, of_nodes_, from_;
-  double beta_ = 1;
-};
 
 }  // namespace
 
 struct ImplicitScheme::Impl {
   const MechanicalSystem& system;
   const ImplicitRule rule;
-  Smooth smooth;
+  NodeForces smooth;
   PrimalDual newton;
   ConstraintForces forces;
   ProjectionMemory impulses;  // of the step so far
