@@ -224,14 +224,11 @@ PathReport EquilibriumPath::step(DynamicState& state, double dt, PathPoint& poin
   }
   out.trouble.clear();
   s.finish(state, dt, point, work, out.step);
-  const double grown = s.iterations <= easy_iterations ? growth * point.length : point.length;
+  const double grown = s.iterations <= easy_iterations ? growth : 1;
   point.moved = s.x - work.other.x;
-  if (s.options.arc_length && !arc) {
-    point.length = std::sqrt(s.product(point.moved, point.moved));
-    point.shortest = std::ldexp(point.length, -halvings_at_most);
-  } else {
-    point.length = arc ? grown : std::min(grown, whole);
-  }
+  const double went = std::sqrt(s.product(point.moved, point.moved));
+  if (s.options.arc_length && !arc) point.shortest = std::ldexp(went, -halvings_at_most);
+  point.length = s.options.arc_length ? grown * went : std::min(grown * point.length, whole);
   point.factor = s.factor >= 1 - 1e-12 ? 1 : s.factor;
   point.negative = s.negative;
   point.remaining = s.remaining;

@@ -350,6 +350,12 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     if (scene.rest) options.residual = rest_residual;
     system->implicit = std::make_unique<ImplicitScheme>(dynamic, limit_options(limit), rule, options);
   }
+  if (scene.rest && scene.rest->load_steps) {
+    if (dynamic.loads.force.isZero(0))
+      throw InputError(scene.path.string() + ": load_steps in [solver] rest: the scene has no loads");
+    system->path = std::make_unique<EquilibriumPath>(
+        dynamic, PathOptions{.load_steps = *scene.rest->load_steps, .arc_length = scene.rest->arc_length});
+  }
   return system;
 }
 

@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "analysis/contact/contact_projection.h"
+#include "analysis/scheme/equilibrium_path.h"
 #include "analysis/scheme/implicit.h"
 #include "pipeline/build/build.h"
 
 namespace toile {
 
-// Pins, projection, masses. `dynamic` and `implicit` point into the rest, so a System stays where it is made.
+// Pins, projection, masses. `dynamic`, `implicit` and `path` point into the rest, so a System stays where it is made.
 struct System {
   System() = default;
   System(const System&) = delete;
@@ -33,6 +34,7 @@ struct System {
   const ContactProjection* contact = nullptr;    // the same, where anything may touch
   MechanicalSystem dynamic;
   std::unique_ptr<ImplicitScheme> implicit;  // null: velocity Verlet
+  std::unique_ptr<EquilibriumPath> path;     // of loads that grow; null: none
 };
 
 // A step of the system's scheme.

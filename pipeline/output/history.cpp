@@ -27,6 +27,10 @@ void add_vectors(std::vector<std::string>& cells, const std::vector<Eigen::Vecto
     for (const double value : x) cells.push_back(text(value));
 }
 
+bool by_load_steps(const Scene& scene) {
+  return scene.rest && scene.rest->load_steps;
+}
+
 void add_names(std::vector<std::string>& cells, const char* what, std::size_t count) {
   for (std::size_t k = 0; k < count; ++k)
     for (const char* axis : {"_x", "_y", "_z"}) cells.push_back(what + std::to_string(k) + axis);
@@ -87,6 +91,7 @@ std::string History::header() const {
     cells.emplace_back(name);
   add_names(cells, "reaction_", build_.scene.pins.size());
   add_names(cells, "point_", build_.scene.points.size());
+  if (by_load_steps(build_.scene)) cells.emplace_back("load_factor");
   return csv_row(cells);
 }
 
@@ -113,6 +118,7 @@ std::string History::row(const RunResult& now) const {
   cells.push_back(now.system->contact ? std::to_string(stepped ? now.last_projection.contacts : 0) : "");
   add_vectors(cells, pin_reactions(build_, *now.system, now.state, stepped ? now.dt_last : 0));
   add_vectors(cells, output_points(build_, q));
+  if (by_load_steps(build_.scene)) cells.push_back(text(now.path.factor));
   return csv_row(cells);
 }
 

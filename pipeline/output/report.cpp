@@ -121,6 +121,10 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
         {"steps", r.steps}, {"halts", r.halts}, {"trials", r.trials}, {"tolerance", rest_tolerance(build)}};
     // Left out where nothing can be said yet.
     if (std::isfinite(r.remaining)) report["rest"]["remaining"] = r.remaining;
+    if (scene.rest->load_steps) {
+      report["rest"]["load_factor"] = run.path.factor;
+      report["rest"]["negative_eigenvalues"] = run.path.negative;
+    }
   }
   const double computing = run.wall_seconds - run.frame_seconds;
   report["wall_seconds"] = computing;
@@ -170,9 +174,12 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
     if (limit.stretched) report["strain"]["limit"]["stretch"] = {limit.weft.stretch, limit.warp.stretch};
   }
   report["points"] = Json::array();
+  const std::vector<Eigen::Vector3d> starts = output_points(build, build.start);
   for (std::size_t k = 0; k < m.points.size(); ++k) {
-    report["points"].push_back(
-        {{"panel", scene.points[k].panel}, {"uv", array(scene.points[k].uv)}, {"position", array(m.points[k])}});
+    report["points"].push_back({{"panel", scene.points[k].panel},
+                                {"uv", array(scene.points[k].uv)},
+                                {"position", array(m.points[k])},
+                                {"moved", array(m.points[k] - starts[k])}});
   }
   report["reactions"] = Json::array();
   for (std::size_t k = 0; k < m.reactions.size(); ++k) {

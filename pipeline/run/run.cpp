@@ -210,6 +210,7 @@ class Run::Impl {
       fail(fmt::format("the step of {:.3g} s is too small to advance the time", dt));
       return;
     }
+    if (result_.system->path) return follow_path(dt);
     for (bool halved = false;; halved = true) {
       const StepReport report = equilibrating() ? result_.system->implicit->equilibrate(
                                                       result_.state, dt, dt * result_.relaxation.dt_share, work_)
@@ -239,15 +240,43 @@ class Run::Impl {
       dt = std::min(dt / 2, largest_step());
       result_.control.scale /= 2;
     }
+    end_of_step(dt);
+  }
+
+  // To the next equilibrium under loads that grow.
+  void follow_path(double dt) {
+    const PathReport found = result_.system->path->step(result_.state, dt, result_.path, work_);
+    result_.projection_seconds += found.step.projection_seconds;
+    result_.redone_steps = result_.path.halvings;
+    if (!found.trouble.empty()) {
+      result_.accepted = RunState(result_);
+      result_.exit = RunExit::solver_failed;
+      result_.reason =
+          fmt::format("no equilibrium {}. {}", found.trouble,
+                      scene_.rest->arc_length ? "Use more solver.rest.load_steps"
+                                              : "Use more solver.rest.load_steps, or solver.rest.arc_length "
+                                                "= true where the load passes a limit");
+      return;
+    }
+    accept(found.step);
+    ++result_.relaxation.steps;
+    if (result_.path.factor == 1) {
+      result_.relaxation.remaining = result_.path.remaining;
+      if (result_.path.negative > 0)
+        result_.warnings.push_back(fmt::format(
+            "the equilibrium is not stable: {} eigenvalues of its stiffness are negative", result_.path.negative));
+    }
+    end_of_step(dt);
+  }
+  void end_of_step(double dt) {
     if (hooks_.progress) hooks_.progress({result_.state.t, scene_.until, dt, result_.steps, result_.frames});
     result_.accepted.reset();
     resumable();
     if (hooks_.stop) result_.exit = hooks_.stop();
-    if (result_.exit != RunExit::ok) {
-      const char* why = result_.exit == RunExit::time_limit ? "stopped by the time limit" : "interrupted";
-      result_.reason = scene_.rest ? fmt::format("{} after {} steps, {}", why, result_.relaxation.steps, unrest())
-                                   : fmt::format("{} at t = {:.6g} s of {:.6g} s", why, result_.state.t, scene_.until);
-    }
+    if (result_.exit == RunExit::ok) return;
+    const char* why = result_.exit == RunExit::time_limit ? "stopped by the time limit" : "interrupted";
+    result_.reason = scene_.rest ? fmt::format("{} after {} steps, {}", why, result_.relaxation.steps, unrest())
+                                 : fmt::format("{} at t = {:.6g} s of {:.6g} s", why, result_.state.t, scene_.until);
   }
 
   // A limit with a law has a balance at every step that is small enough; hard rows that depend on each other may not.
@@ -283,6 +312,8 @@ class Run::Impl {
     if (result_.state.t < pins_done_) restart(relaxation);
   }
   std::string unrest() const {
+    if (result_.system->path && result_.path.factor != 1)
+      return fmt::format("{:.4g} of the loads are on", result_.path.factor);
     const double left = result_.relaxation.remaining;
     return std::isfinite(left) ? fmt::format("a point would still move by {:.3g} m if released", left)
                                : "the cloth is still on its way";
@@ -297,6 +328,7 @@ class Run::Impl {
 
   // Less than what ends a run, but more than a stable one gains.
   void check_energy() {
+    if (result_.system->path) return;  // no motion
     const EnergyBalance& e = result_.energy;
     const double exchanged = result_.watch.exchanged;
     if (!(e.injected > scene_.energy_gain * exchanged) || !(e.injected > result_.watch.rounding)) return;

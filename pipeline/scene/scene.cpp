@@ -538,6 +538,22 @@ void read_solver(Table table, Scene& scene) {
       scene.rest->method = *method == "newton" ? RestMethod::newton : RestMethod::relaxation;
     scene.rest->tolerance = rest->number("tolerance", dimension::length, Range::positive);
     if (const auto n = rest->integer("max_steps", 1, 1000000000)) scene.rest->max_steps = *n;
+    scene.rest->load_steps = rest->integer("load_steps", 1, 1000000);
+    scene.rest->arc_length = rest->boolean("arc_length").value_or(false);
+    if (scene.rest->arc_length && !scene.rest->load_steps) scene.rest->load_steps = 10;
+    for (const char* key : {"load_steps", "arc_length"}) {
+      const toml::node* node = rest->raw().get(key);
+      if (!node) continue;
+      if (scene.rest->method != RestMethod::newton)
+        rest->fail(*node, fmt::format("{} in rest belongs to method = \"newton\"", key));
+      if (scene.strain_limit.on)
+        rest->fail(*node,
+                   fmt::format("{} in rest knows no strain limit in this version: strain_limit.mode = \"off\"", key));
+      for (const ScenePin& pin : scene.pins)
+        if (pin.move || pin.release)
+          rest->fail(*node,
+                     fmt::format("{} in rest: {} moves or is released, which load steps can't follow", key, pin.where));
+    }
     rest->done();
   }
   if (implicit(scene) && scene.strain_limit.on && !has_law(scene.strain_limit.solver))

@@ -118,6 +118,9 @@ struct SceneRest {
   RestMethod method = RestMethod::relaxation;
   std::optional<double> tolerance;  // m that material points may swing when let go; unset: 1e-4 of the largest panel
   int max_steps = 1000000;
+  // By Newton's method: the loads grow in so many steps, along the arc length of the path where it passes limits.
+  std::optional<int> load_steps;
+  bool arc_length = false;
 };
 
 struct OutputPoint {

@@ -152,6 +152,8 @@ std::span<const KeyWords> scene_words() {
       {"rest_in_solver.method", "Swinging until it rests, or Newton's method (default: relaxation)"},
       {"rest_in_solver.tolerance", "How far a point may still move when released (default: 1e-4 of the largest panel)"},
       {"rest_in_solver.max_steps", "Steps at most (default: 1000000)"},
+      {"rest_in_solver.load_steps", "Newton's method: steps in which the loads grow (default: all at once)"},
+      {"rest_in_solver.arc_length", "Steps of the path's length, beyond limit points of the load (default: false)"},
       {"solver.energy_gain", "Energy that may grow without work, as a share of the energy exchanged (default: 0.01)"},
       {"solver.time_limit", "Wall time after which the run stops with a checkpoint (default: none)"},
       {"output.every", "Time between frames (default: 1/30 s)"},

@@ -194,11 +194,66 @@ TrimmedSurface arched_square(double height) {
   return untrimmed(plain.with_points(std::move(points)));
 }
 
+// Rational quadratic arc about the origin over [a, a + turn], turn < pi: cosines, sines and weights of its points.
+struct Arc {
+  Eigen::Vector3d x, y, weight;
+};
+Arc arc(double a, double turn) {
+  const double w = std::cos(turn / 2);
+  return {{std::cos(a), std::cos(a + turn / 2) / w, std::cos(a + turn)},
+          {std::sin(a), std::sin(a + turn / 2) / w, std::sin(a + turn)},
+          {1, w, 1}};
+}
+
+// Part of a cylinder about the y axis: u in [0, 1] along the arc, from angle a against the z axis on towards x; v is y.
+NurbsSurface cylinder(double radius, double a, double turn, Interval y) {
+  const Arc c = arc(a, turn);
+  Eigen::Matrix3Xd points(3, 6);
+  std::vector<double> weights;
+  for (int j = 0; j < 2; ++j) {
+    for (int i = 0; i < 3; ++i) {
+      points.col(i + 3 * j) << radius * c.y[i], j == 0 ? y.min : y.max, radius * c.x[i];
+      weights.push_back(c.weight[i]);
+    }
+  }
+  return {uniform_knots(2, 1), uniform_knots(1, 1, y), points, weights};
+}
+
+// A quarter of the sphere's belt from the equator up: u is the longitude from x to y, v the latitude.
+NurbsSurface sphere(double radius, double latitude) {
+  const Arc around = arc(0, std::numbers::pi / 2), up = arc(0, latitude);
+  Eigen::Matrix3Xd points(3, 9);
+  std::vector<double> weights;
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) {
+      points.col(i + 3 * j) << radius * up.x[j] * around.x[i], radius * up.x[j] * around.y[i], radius * up.y[j];
+      weights.push_back(around.weight[i] * up.weight[j]);
+    }
+  }
+  return {uniform_knots(2, 1), uniform_knots(2, 1), points, weights};
+}
+
+// The whole roof, 80 degrees and 50 long, as a trim in 100 degrees and 60. Curves 0 and 2 are the arcs at its ends.
+TrimmedSurface trimmed_roof() {
+  constexpr double degree = std::numbers::pi / 180, turn = 100 * degree, cut = 10 * degree;
+  const double a = std::sin(cut / 2), b = std::sin((turn - cut) / 2), u = a / (a + b);
+  return trimmed(cylinder(25, -turn / 2, turn, {-30, 30}), polygon({{u, -25}, {1 - u, -25}, {1 - u, 25}, {u, 25}}));
+}
+
+void write_shell_panels(const std::filesystem::path& out) {
+  constexpr double degree = std::numbers::pi / 180;
+  write(out / "roof.igs", untrimmed(cylinder(25, 0, 40 * degree, {0, 25})), "shell", 1, "M");
+  write(out / "trimmed_roof.igs", trimmed_roof(), "shell", 1, "M");
+  write(out / "cylinder.igs", untrimmed(cylinder(300, 0, 90 * degree, {0, 300})), "shell", 1, "M");
+  write(out / "hemisphere.igs", untrimmed(sphere(10, 72 * degree)), "shell", 1, "M");
+}
+
 void write_study_panels(const std::filesystem::path& out) {
   write(out / "studies/cantilever/strip.igs", untrimmed(flat({0, 0.2}, {0, 0.02}, 1, 1, 1)), "strip", 1, "M");
   write(out / "studies/disc/trimmed.igs", trimmed_disc(0.7), "disc", 1, "M");
   write(out / "studies/disc/fitted.igs", fitted_disc(), "disc", 1, "M");
   write(out / "studies/rules/arch.igs", arched_square(0.1), "cloth", 1, "M");
+  write_shell_panels(out / "studies/shells");
   const std::filesystem::path stability = out / "stability/panels";
   for (int k = 1; k <= 4; ++k) {
     write(stability / ("aspect_1e" + std::to_string(k) + ".igs"),

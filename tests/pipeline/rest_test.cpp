@@ -71,6 +71,60 @@ TEST(Rest, NewtonsMethodEndsWhereRelaxationDoes) {
   }
 }
 
+// The same equilibria by steps of the load and of the path's length, on a net that fits and on a trimmed one.
+TEST(Rest, LoadStepsEndWhereNewtonsMethodAndRelaxationDo) {
+  const std::vector<std::string> linear = {
+      "panel.0.refine={degree=3,spans=[8,1]}",
+      "fabric.strip.bending={kappa0=1e4,kappa_reg=1e4,twist=7.848e-4,b0=7.848e-4}"};
+  const auto strip = [&](const std::string& rest) {
+    std::vector<std::string> settings = linear;
+    settings.push_back("solver.rest=" + rest);
+    return end_of(sample("studies/cantilever/scene.toml", settings));
+  };
+  const Ended relaxed = strip("{tolerance=1e-5}");
+  for (const char* rest : {"{method='newton',load_steps=10}", "{method='newton',load_steps=10,arc_length=true}"}) {
+    const Ended e = strip(rest);
+    ASSERT_EQ(e.run.exit, RunExit::ok) << e.run.reason;
+    EXPECT_EQ(e.report["rest"]["load_factor"], 1);
+    EXPECT_EQ(e.report["rest"]["negative_eigenvalues"], 0);
+    EXPECT_LT((e.points[0] - relaxed.points[0]).norm(), 1e-4) << rest;
+    EXPECT_GE(e.run.steps, 8);
+  }
+  const std::vector<std::string> soft = {"strain_limit.mode=off", "solver.until=rest"};
+  const auto turned = [&](const char* rest) {
+    std::vector<std::string> settings = soft;
+    settings.push_back(std::string("solver.rest=") + rest);
+    return end_of(sample("grid_independence/turned_30.toml", settings));
+  };
+  const Ended whole = turned("{method='newton'}"), stepped = turned("{method='newton',load_steps=10}");
+  ASSERT_EQ(stepped.run.exit, RunExit::ok) << stepped.run.reason;
+  for (const int k : {0, 1}) EXPECT_LT((whole.points[k] - stepped.points[k]).norm(), 1e-4);
+}
+
+TEST(Rest, TheHistoryOfLoadStepsNamesTheLoad) {
+  const Folder folder("load_steps");
+  test::write_panels(folder / "panel.igs", {test::sheet("cloth")});
+  const std::vector<std::string> settings = {"solver.until=rest",
+                                             "solver.rest={method='newton',load_steps=4}",
+                                             "strain_limit.mode=off",
+                                             "output.history=step",
+                                             "fabric.a={}",
+                                             "panel.0.fabric=a",
+                                             "fabric.a.bending={b0=0.01,kappa0=1e4,kappa_reg=1e4}"};
+  const Build b = build(
+      parse_scene(test::scene_text("[[pin]]\nat = \"edge:u0\"\nclamp = true\n"), folder / "scene.toml", settings));
+  std::vector<double> factors;
+  RunHooks hooks;
+  hooks.resumable = [&](const RunResult& now) {
+    if (factors.empty() || factors.back() != now.path.factor) factors.push_back(now.path.factor);
+  };
+  const RunResult result = run(b, hooks);
+  ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+  EXPECT_EQ(factors, (std::vector<double>{0, 0.25, 0.5, 0.75, 1}));
+  const StateMeasures m = measure(b, *result.system, result.state, result.dt_last);
+  EXPECT_NEAR(m.reactions[0].z(), 9.81 * b.model->lumped_mass().sum(), 1e-6 * m.reactions[0].z());
+}
+
 // Drag takes twelve seconds to stop the swing; what is left then is far below a tenth of a millimetre.
 TEST(Rest, TheKidnappedClothEndsWhereDragLeavesIt) {
   const Ended still = end_of(sample("kidnapped_a/scene.toml", {"solver.until=rest"}));
