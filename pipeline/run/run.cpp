@@ -251,11 +251,13 @@ class Run::Impl {
     if (!found.trouble.empty()) {
       result_.accepted = RunState(result_);
       result_.exit = RunExit::solver_failed;
-      result_.reason =
-          fmt::format("no equilibrium {}. {}", found.trouble,
-                      scene_.rest->arc_length ? "Use more solver.rest.load_steps"
-                                              : "Use more solver.rest.load_steps, or solver.rest.arc_length "
-                                                "= true where the load passes a limit");
+      const char* advice = result_.path.factor == 0
+                               ? "Where cloth swings freely without loads leave load_steps out; else use more"
+                           : scene_.rest->arc_length
+                               ? "Use more solver.rest.load_steps"
+                               : "Use more solver.rest.load_steps, or solver.rest.arc_length = true where the load "
+                                 "passes a limit";
+      result_.reason = fmt::format("no equilibrium {}. {}", found.trouble, advice);
       return;
     }
     accept(found.step);

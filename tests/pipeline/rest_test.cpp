@@ -90,15 +90,19 @@ TEST(Rest, LoadStepsEndWhereNewtonsMethodAndRelaxationDo) {
     EXPECT_LT((e.points[0] - relaxed.points[0]).norm(), 1e-4) << rest;
     EXPECT_GE(e.run.steps, 8);
   }
-  const std::vector<std::string> soft = {"strain_limit.mode=off", "solver.until=rest"};
+  const std::vector<std::string> soft = {"strain_limit={mode='off'}", "pin=[{at='curve:0,0'},{at='curve:0,2'}]"};
   const auto turned = [&](const char* rest) {
     std::vector<std::string> settings = soft;
-    settings.push_back(std::string("solver.rest=") + rest);
+    settings.push_back(std::string("solver={until='rest',rest=") + rest + "}");
     return end_of(sample("grid_independence/turned_30.toml", settings));
   };
-  const Ended whole = turned("{method='newton'}"), stepped = turned("{method='newton',load_steps=10}");
-  ASSERT_EQ(stepped.run.exit, RunExit::ok) << stepped.run.reason;
-  for (const int k : {0, 1}) EXPECT_LT((whole.points[k] - stepped.points[k]).norm(), 1e-4);
+  const Ended swung = turned("{tolerance=1e-5}");
+  for (const char* rest :
+       {"{method='newton'}", "{method='newton',load_steps=5}", "{method='newton',arc_length=true}"}) {
+    const Ended e = turned(rest);
+    ASSERT_EQ(e.run.exit, RunExit::ok) << e.run.reason;
+    for (const int k : {0, 1}) EXPECT_LT((e.points[k] - swung.points[k]).norm(), 1e-5) << rest;
+  }
 }
 
 TEST(Rest, TheHistoryOfLoadStepsNamesTheLoad) {

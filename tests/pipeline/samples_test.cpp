@@ -97,7 +97,7 @@ TEST(Samples, PanelsAreWhatTheDrafterWrites) {
       EXPECT_EQ(read_file(entry.path()), read_file(kept));
     ++files;
   }
-  EXPECT_EQ(files, 34);
+  EXPECT_EQ(files, 38);
 }
 
 // Example 4.4 with projection, the limit carrying almost all of the load: eq. 37, raw and smoothed. The paper's variant
