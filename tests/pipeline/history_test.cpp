@@ -42,6 +42,20 @@ struct Table {
   double number(std::size_t row, const std::string& name) const { return std::stod(rows.at(row).at(name)); }
 };
 
+TEST(History, NamesTheLoadOfEveryStepWhereLoadsGrow) {
+  const Folder folder("history_load");
+  const Build b =
+      built(folder, {"strain_limit={mode='off'}", "output.history=step", "pin=[{at='curve:0,2'},{at='curve:0,0'}]",
+                     "solver={until='rest',rest={method='newton',load_steps=2}}"});
+  History history(b, folder / "history.csv", {}, RunState{});
+  RunHooks hooks;
+  hooks.resumable = [&](const RunResult& now) { history.add(now); };
+  ASSERT_EQ(run(b, hooks).exit, RunExit::ok);
+  const Table table(read_file(folder / "history.csv"));
+  ASSERT_EQ(table.rows.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(table.number(k, "load_factor"), 0.5 * static_cast<double>(k));
+}
+
 TEST(History, HasARowAFrameWithTheNumbersOfTheReport) {
   const Folder folder("history");
   const Build b = built(folder);

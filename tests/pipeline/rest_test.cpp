@@ -105,28 +105,51 @@ TEST(Rest, LoadStepsEndWhereNewtonsMethodAndRelaxationDo) {
   }
 }
 
-TEST(Rest, TheHistoryOfLoadStepsNamesTheLoad) {
+TEST(Rest, LoadStepsLandOnTheirMultiplesAndCanBeResumed) {
   const Folder folder("load_steps");
   test::write_panels(folder / "panel.igs", {test::sheet("cloth")});
-  const std::vector<std::string> settings = {"solver.until=rest",
-                                             "solver.rest={method='newton',load_steps=4}",
-                                             "strain_limit.mode=off",
-                                             "output.history=step",
-                                             "fabric.a={}",
-                                             "panel.0.fabric=a",
+  const std::vector<std::string> settings = {"solver={until='rest',rest={method='newton',load_steps=4}}",
+                                             "strain_limit={mode='off'}", "panel.0.fabric=a",
                                              "fabric.a.bending={b0=0.01,kappa0=1e4,kappa_reg=1e4}"};
   const Build b = build(
       parse_scene(test::scene_text("[[pin]]\nat = \"edge:u0\"\nclamp = true\n"), folder / "scene.toml", settings));
   std::vector<double> factors;
+  std::string checkpoint;
   RunHooks hooks;
   hooks.resumable = [&](const RunResult& now) {
     if (factors.empty() || factors.back() != now.path.factor) factors.push_back(now.path.factor);
+    if (now.path.factor == 0.5) checkpoint = format_checkpoint(scene_mark(b), now, *now.system);
   };
   const RunResult result = run(b, hooks);
   ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
   EXPECT_EQ(factors, (std::vector<double>{0, 0.25, 0.5, 0.75, 1}));
   const StateMeasures m = measure(b, *result.system, result.state, result.dt_last);
   EXPECT_NEAR(m.reactions[0].z(), 9.81 * b.model->lumped_mass().sum(), 1e-6 * m.reactions[0].z());
+  const RunResult resumed = run(b, parse_checkpoint(checkpoint, "checkpoint", b));
+  EXPECT_EQ(resumed.state.x, result.state.x);
+  EXPECT_EQ(resumed.steps, result.steps);
+}
+
+TEST(Rest, LoadStepsSayWhatTheyCanNotFollow) {
+  const Folder folder("load_steps_refused");
+  test::write_panels(folder / "panel.igs", {test::sheet("cloth")});
+  const auto message = [&](const std::string& pins, const std::string& rest, const char* limit) {
+    try {
+      parse_scene(test::scene_text(pins), folder / "scene.toml",
+                  std::vector<std::string>{"solver={until='rest',rest=" + rest + "}", limit});
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  const char* off = "strain_limit={mode='off'}";
+  const std::string pin = "[[pin]]\nat = \"edge:u0\"\n", steps = "{method='newton',load_steps=4}";
+  EXPECT_EQ(message(pin, steps, off), "accepted");
+  EXPECT_NE(message(pin, "{arc_length=true}", off).find("method = \"newton\""), std::string::npos);
+  EXPECT_NE(message(pin, steps, "strain_limit={}").find("strain_limit.mode"), std::string::npos);
+  EXPECT_NE(
+      message(pin + "[[pin]]\nat = \"edge:u1\"\nmove = { end = 1 }\n", steps, off).find("load steps can't follow"),
+      std::string::npos);
 }
 
 // Drag takes twelve seconds to stop the swing; what is left then is far below a tenth of a millimetre.
