@@ -255,7 +255,11 @@ void EquilibriumPath::Impl::finish(DynamicState& state, double dt, const PathPoi
   system.map->reduce(next.f, next.a, system.workers);
   for (int k = 0; k < system.node_mass.size(); ++k) next.a.segment<3>(3 * k) /= system.node_mass[k];
   report.load_work = 0.5 * (point.factor + factor) * system.loads.force.dot(next.q - state.q);
-  if (system.projection) system.projection->restore({Vector(), dt * dt * mu, Eigen::Matrix3Xd(3, 0)});
+  if (system.projection) {
+    ProjectionMemory memory = no_impulses(rows);
+    memory.place_multipliers = dt * dt * mu;
+    system.projection->restore(memory);
+  }
   std::swap(state, next);
 }
 
