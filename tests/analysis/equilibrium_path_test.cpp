@@ -167,8 +167,8 @@ ShellProblem hinged_roof(double thickness, int spans) {
 }
 
 // Pushed down at its crown the roof carries no more than its limit load, snaps through and carries again from the least
-// load on. At a given depth the load is up to 2 % above the table's, whose shell gives under the force by shear as
-// well.
+// load on. At a given depth the load is up to 2 % above the table's, probably as that shell gives under the force
+// by shear as well.
 TEST(EquilibriumPath, HingedRoofsCarryTheirLimitLoads) {
   for (const auto& [thickness, most, least, crown] :
        {std::tuple(12.7, 0.7421, 0.1729, 15.0), {6.35, 0.1953, -0.1288, 13.0}}) {
