@@ -99,7 +99,7 @@ class Refinement {
 
   // Of an edge along a trim the middle of the trim between its ends.
   Middle middle_of(const std::array<int, 2>& edge, bool border) const {
-    const auto [a, b] = edge;
+    const int a = edge[0], b = edge[1];
     Middle out;
     out.uv = 0.5 * (uv_[a] + uv_[b]);
     if (border) {

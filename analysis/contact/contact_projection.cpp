@@ -591,9 +591,6 @@ ProjectionReport ContactProjection::step(Nodes x, Nodes v, double t, const Eigen
     z = s.impulses();
     const Clock::time_point sweeping = Clock::now();
     const double first = s.sweep(x);
-    if (getenv("DBG"))
-      fprintf(stderr, "t %.4f round %d first %.3g iterations %d conv %d strain %.3g rows %zu\n", t, round, first,
-              report.iterations, report.converged, report.strain_violation, s.rows.size());
     settled = first <= 1;
     const bool once = s.inner && !s.inner->follows();
     for (int k = 0; k < (once ? last_sweeps : most_sweeps) && !settled; ++k)

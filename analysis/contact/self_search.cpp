@@ -78,7 +78,7 @@ SelfSearch::SelfSearch(const ContactProxy& proxy, Matrix3Xd rest, double largest
                                                   there.end());
   for (std::vector<int>& list : beside_) {
     std::ranges::sort(list);
-    list.erase(std::ranges::unique(list).begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
   }
   boxes_.resize(cells_.size());
   cones_.resize(cells_.size());
@@ -156,7 +156,8 @@ void SelfSearch::vertices_to_triangles(const Moved& m, int a, int b, std::vector
     if (!within(way, boxes_[static_cast<std::size_t>(b)], reach)) continue;
     for (const int t : cells_[static_cast<std::size_t>(b)].triangles) {
       if (!within(way, triangle_boxes_[static_cast<std::size_t>(t)], reach)) continue;
-      const auto& [i, j, k] = proxy_.triangles()[static_cast<std::size_t>(t)];
+      const std::array<int, 3>& corners = proxy_.triangles()[static_cast<std::size_t>(t)];
+      const int i = corners[0], j = corners[1], k = corners[2];
       if (v == i || v == j || v == k) continue;
       const auto height = [&](const Matrix3Xd& x) {
         const Vector3d normal = (x.col(j) - x.col(i)).cross(x.col(k) - x.col(i)).normalized();

@@ -24,7 +24,7 @@ std::string lower(std::string text) {
 
 class Expander {
  public:
-  explicit Expander(const Drawing& drawing) : drawing_(drawing) {
+  explicit Expander(const Drawing& drawing) {
     for (std::size_t k = 1; k < drawing.blocks.size(); ++k)
       blocks_.try_emplace(drawing.blocks[k].name, &drawing.blocks[k]);
   }
@@ -61,7 +61,6 @@ class Expander {
     }
     within.pop_back();
   }
-  const Drawing& drawing_;
   std::map<std::string, const Block*> blocks_;
 };
 

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double least = 1e-9, most = 0.1;  // of the domain
+constexpr double least_gap = 1e-9, most_gap = 0.1;  // of the domain
 
 // How far places lie beyond the domain, as a part of it; closed directions have no beyond.
 double beyond(const FacePlane& plane, const Vector2d& x) {
@@ -70,7 +70,8 @@ std::optional<FileSurface> continued_surface(const FileSurface& surface, const s
     reach.beyond = std::max(reach.beyond, one.beyond);
     reach.box.extend(one.box);
   }
-  if (!(reach.beyond > least) || !(beyond(plane, reach.box.min()) <= most) || !(beyond(plane, reach.box.max()) <= most))
+  if (!(reach.beyond > least_gap) || !(beyond(plane, reach.box.min()) <= most_gap) ||
+      !(beyond(plane, reach.box.max()) <= most_gap))
     return std::nullopt;
   FileSurface out = surface;
   for (int k = 0; k < 2; ++k) {
