@@ -10,38 +10,38 @@
 
 #include "analysis/contact/contact_proxy.h"
 #include "analysis/contact/contact_row.h"
+#include "analysis/contact/contact_search.h"
 #include "analysis/contact/obstacle.h"
 #include "analysis/projection/constraint_solver.h"
 
 namespace toile {
 
 struct ContactOptions {
-  double acceleration = 9.81;   // m/s2 at work, which small displacements and forces are compared with
-  double push_out = 0.2;        // m/s, at which cloth that starts nearer than its offset is moved off, without velocity
-  double largest_chord = 1e-3;  // m, of the chord error that is added to the offset
-  int max_rounds = 30;          // of contact and the other constraints in turn
-  bool self = false;            // the cloth meets itself
-  Eigen::MatrixXd friction;     // panels x obstacles; empty: the obstacles' own
+  double acceleration = 9.81;  // m/s2 at work, which small displacements and forces are compared with
+  double push_out = 0.2;       // m/s, at which cloth that starts nearer than its offset is moved off, without velocity
+  int max_rounds = 30;         // of contact and the other constraints in turn
+  ContactSearchOptions search = {};
 };
 
 // The offset of a vertex from an obstacle is half the cloth's thickness, the obstacle's thickness and the chord error
-// there. A contact yields to its own normal force: under 100 times its own weight by the offset.
+// there. A contact yields to its normal force, under its own weight by a hundredth of the offset and never by more than
+// three tenths.
 //
 // Contact impulses p [kg m] move nodes in the step by M^-1 W^T p and change velocities by M^-1 W^T p / dt, within the
 // solution of the other constraints; settle() then takes inward and held velocities out. A resting contact has half its
 // force from each.
 //   (1) the normal impulse is >= 0, the tangential one at most friction times it;
 //   (2) a contact that sticks stays at its anchor, a material point of the obstacle; one that slides takes it along;
-//   (3) `converged`: with the other constraints met, no contact would move by more than 2 % of its offset along the
-//       normal, nor by 0.2 % of acceleration dt^2 along the surface;
-//   (4) what moved no vertex farther than its distance costs no search; results don't depend on that, nor on threads;
+//   (3) `contact_met`: with the other constraints met, no contact would move by more than 2 % of its offset along the
+//       normal, nor along the surface by more than 0.2 % of acceleration dt^2 or 1 % of what its normal force moves it;
+//   (4) results don't depend on threads;
 //   (5) contacts of a still obstacle add no energy but the law's.
 class ContactProjection final : public ConstraintSolver {
  public:
   // `inner`: the other constraints; null: none. Obstacles must outlive it.
   // `node_drag` [kg/s]: steps take it as if nothing touched, which the reported forces make up for.
   ContactProjection(const Body& body, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                    const Eigen::VectorXd& node_drag, std::vector<ProxyPanel> panels,
+                    const Eigen::VectorXd& node_drag, const std::vector<ProxyPanel>& panels,
                     const std::vector<std::unique_ptr<Obstacle>>& obstacles, std::unique_ptr<ConstraintSolver> inner,
                     const ContactOptions& options = {});
   ~ContactProjection() override;

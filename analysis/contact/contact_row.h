@@ -9,10 +9,12 @@
 
 namespace toile {
 
+constexpr double least_offset = 1e-5;  // m, that displacements are compared with where nothing has a thickness
+
 //   y = sum value_k x_k + constant over nodes;   normal . (y - target) - offset >= 0
 // with y the point of the cloth (of self-contact: the vector between its two points, and target 0).
 struct ContactRow {
-  std::array<int, 4> key{};  // kind, two features of cloth or obstacle, obstacle (-1: the cloth itself)
+  std::array<int, 4> key{};  // ContactKind, two features of cloth or obstacle, obstacle (-1: the cloth itself)
   std::vector<std::pair<int, double>> nodes = {};
   std::vector<std::pair<int, double>> vertices = {};  // of the proxy, by which the nodes are reached
   Eigen::Vector3d constant{0, 0, 0};                  // what fixed control points add

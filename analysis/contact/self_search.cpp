@@ -7,33 +7,15 @@
 #include <map>
 #include <optional>
 
+#include "analysis/contact/pair_geometry.h"
+
 namespace toile {
 namespace {
 
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
-constexpr double parallel = 0.05;  // sine of the angle below which edges meet nowhere in particular
-constexpr double beyond = 0.05;    // of an edge or triangle: so far outside of it something may pass through it
-
-// Weights of the corners of a triangle at the place that p is over; unset for a triangle without area.
-std::optional<Vector3d> weights(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& p) {
-  const Vector3d ab = b - a, ac = c - a, normal = ab.cross(ac);
-  const double area = normal.squaredNorm();
-  if (!(area > 0)) return std::nullopt;
-  const double v = normal.dot((p - a).cross(ac)) / area, w = normal.dot(ab.cross(p - a)) / area;
-  return Vector3d(1 - v - w, v, w);
-}
-
-// Shares of two edges at which their lines are nearest; unset where they are all but parallel.
-std::optional<std::array<double, 2>> nearest(const Vector3d& a, const Vector3d& along, const Vector3d& b,
-                                             const Vector3d& other) {
-  const double aa = along.squaredNorm(), bb = other.squaredNorm(), ab = along.dot(other), det = aa * bb - ab * ab;
-  if (!(det > parallel * parallel * aa * bb)) return std::nullopt;
-  const Vector3d between = a - b;
-  return std::array{(ab * other.dot(between) - bb * along.dot(between)) / det,
-                    (aa * other.dot(between) - ab * along.dot(between)) / det};
-}
+constexpr double beyond = 0.05;  // of an edge or triangle: so far outside of it something may pass through it
 
 bool inside(double share, double slack) {
   return share >= -slack && share <= 1 + slack;
@@ -164,23 +146,24 @@ void SelfSearch::vertices_to_triangles(const Moved& m, int a, int b, std::vector
         return normal.dot(x.col(v) - x.col(i));
       };
       const double before = height(m.from), after = height(m.at);
-      const double side = before < 0 ? -1 : 1;
-      double sign = side;
+      double side = before < 0 ? -1 : 1, slack = 0;
       if (before * after < 0) {
         // Through the triangle, or past it?
-        const double s = before / (before - after);
-        const auto there = [&](int n) -> Vector3d { return (1 - s) * m.from.col(n) + s * m.at.col(n); };
-        const auto w = weights(there(i), there(j), there(k), there(v));
-        if (!w || w->minCoeff() < -beyond) sign = -side;
+        const double part = before / (before - after);
+        const auto there = [&](int n) -> Vector3d { return (1 - part) * m.from.col(n) + part * m.at.col(n); };
+        const auto then = weights_below(there(i), there(j), there(k), there(v));
+        if (then && then->minCoeff() >= -beyond)
+          slack = beyond;
+        else
+          side = -side;
       }
-      const auto w = weights(m.at.col(i), m.at.col(j), m.at.col(k), m.at.col(v));
-      if (!w || w->minCoeff() < (sign == side ? -beyond : 0.0)) continue;
-      if (sign == side && before * after >= 0 && w->minCoeff() < 0) continue;
+      const auto w = weights_below(m.at.col(i), m.at.col(j), m.at.col(k), m.at.col(v));
+      if (!w || w->minCoeff() < -slack) continue;
       SelfMeeting meeting;
       meeting.first = v;
       meeting.second = t;
       meeting.vertices = {{v, 1.0}, {i, -(*w)[0]}, {j, -(*w)[1]}, {k, -(*w)[2]}};
-      meeting.normal = sign * (m.at.col(j) - m.at.col(i)).cross(m.at.col(k) - m.at.col(i)).normalized();
+      meeting.normal = side * (m.at.col(j) - m.at.col(i)).cross(m.at.col(k) - m.at.col(i)).normalized();
       add(m, std::move(meeting), out);
     }
   }
@@ -197,7 +180,7 @@ void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMe
       const auto [r, s] = proxy_.edges()[static_cast<std::size_t>(f)];
       if (p == r || p == s || q == r || q == s) continue;
       const Vector3d along = m.at.col(q) - m.at.col(p), other = m.at.col(s) - m.at.col(r);
-      const auto shares = nearest(m.at.col(p), along, m.at.col(r), other);
+      const auto shares = nearest_on_lines(m.at.col(p), along, m.at.col(r), other);
       if (!shares) continue;
       const auto [u, v] = *shares;
       const auto apart = [&, p = p, q = q, r = r, s = s](const Matrix3Xd& x) -> Vector3d {
@@ -210,7 +193,7 @@ void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMe
       if (before * after < 0) {
         const double part = before / (before - after);
         const auto there = [&](int n) -> Vector3d { return (1 - part) * m.from.col(n) + part * m.at.col(n); };
-        const auto then = nearest(there(p), there(q) - there(p), there(r), there(s) - there(r));
+        const auto then = nearest_on_lines(there(p), there(q) - there(p), there(r), there(s) - there(r));
         if (then && inside((*then)[0], beyond) && inside((*then)[1], beyond))
           slack = beyond;
         else
@@ -246,9 +229,10 @@ void SelfSearch::add(const Moved& m, SelfMeeting meeting, std::vector<SelfMeetin
     chord = std::max(chord, proxy_.chord_error(vertex, m.at, share > 0 ? meeting.normal : Vector3d(-meeting.normal)));
   }
   meeting.chord = std::min(first_chord, largest_chord_) + std::min(second_chord, largest_chord_);
-  meeting.offset = thickness + meeting.chord;
+  meeting.thickness = thickness;
+  const double offset = thickness + meeting.chord;
   meeting.distance = meeting.normal.dot(before);
-  if (gap > meeting.offset + m.margin || rest.norm() < meeting.offset + m.margin) return;
+  if (gap > offset + m.margin || rest.norm() < offset + m.margin) return;
   out.push_back(std::move(meeting));
 }
 

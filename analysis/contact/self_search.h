@@ -19,8 +19,8 @@ struct SelfMeeting {
   int first = 0, second = 0;  // vertex and triangle; edges
   std::vector<std::pair<int, double>> vertices;
   Eigen::Vector3d normal{0, 0, 1};  // unit, towards the first: from the side that it was on at the start
-  double offset = 0;                // m: half of both thicknesses and the chord errors there
-  double chord = 0;                 // m, the part that is chord errors
+  double thickness = 0;             // m: half of both
+  double chord = 0;                 // m, of both: the offset is their sum
   double distance = 0;              // m along the normal, at the start
 };
 

@@ -27,6 +27,28 @@ std::pair<int, int> divisions(const NurbsSurface& rest, double spacing) {
   return {parts(rest.u(), rest.v(), true), parts(rest.v(), rest.u(), false)};
 }
 
+// Of obstacles their own, of two panels the mean of theirs; of named pairs what the scene says.
+void set_friction(const Build& build, ContactSearchOptions& options) {
+  const auto panels = static_cast<Eigen::Index>(build.panels.size()),
+             obstacles = static_cast<Eigen::Index>(build.obstacles.size());
+  const auto own = [&](Eigen::Index k) { return build.proxies[static_cast<std::size_t>(k)].friction; };
+  const auto panel = [&](Eigen::Index k) { return build.panels[static_cast<std::size_t>(k)].name; };
+  const auto obstacle = [&](Eigen::Index k) { return build.obstacles[static_cast<std::size_t>(k)]->name(); };
+  const auto of_pair = [&](const std::string& a, const std::string& b, double usual) {
+    for (const SceneContactPair& pair : build.scene.contact_pairs)
+      if ((pair.a == a && pair.b == b) || (pair.a == b && pair.b == a)) return pair.friction;
+    return usual;
+  };
+  options.friction.resize(panels, obstacles);
+  options.friction_of_panels.resize(panels, panels);
+  for (Eigen::Index k = 0; k < panels; ++k) {
+    for (Eigen::Index o = 0; o < obstacles; ++o)
+      options.friction(k, o) = of_pair(panel(k), obstacle(o), build.obstacles[static_cast<std::size_t>(o)]->friction());
+    for (Eigen::Index l = 0; l < panels; ++l)
+      options.friction_of_panels(k, l) = of_pair(panel(k), panel(l), 0.5 * (own(k) + own(l)));
+  }
+}
+
 }  // namespace
 
 std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& notes) {
@@ -50,22 +72,12 @@ std::unique_ptr<ContactProjection> with_contact(const Build& build, const Affine
                                                 std::unique_ptr<ConstraintSolver> inner) {
   const Scene& scene = build.scene;
   ContactOptions options;
-  options.self = scene.contact.self;
   options.push_out = scene.contact.push_out;
-  options.largest_chord = 2 * scene.contact.chord;
   // Without gravity forces are small beside those of a metre a second squared.
   options.acceleration = std::max(scene.gravity.norm(), 1.0);
-  options.friction.resize(static_cast<Eigen::Index>(build.panels.size()),
-                          static_cast<Eigen::Index>(build.obstacles.size()));
-  for (Eigen::Index o = 0; o < options.friction.cols(); ++o)
-    options.friction.col(o).setConstant(build.obstacles[static_cast<std::size_t>(o)]->friction());
-  for (const SceneContactPair& pair : scene.contact_pairs)
-    for (std::size_t k = 0; k < build.panels.size(); ++k)
-      for (std::size_t o = 0; o < build.obstacles.size(); ++o) {
-        const std::string &panel = build.panels[k].name, &obstacle = build.obstacles[o]->name();
-        if ((pair.a == panel && pair.b == obstacle) || (pair.a == obstacle && pair.b == panel))
-          options.friction(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(o)) = pair.friction;
-      }
+  options.search.self = scene.contact.self;
+  options.search.largest_chord = 2 * scene.contact.chord;
+  set_friction(build, options.search);
   return std::make_unique<ContactProjection>(*build.model, map, node_mass, node_drag, build.proxies, build.obstacles,
                                              std::move(inner), options);
 }

@@ -66,9 +66,7 @@ struct ContactScene {
     system.map = &map;
     system.node_mass = map.reduce_scalar(model.lumped_mass());
     system.node_drag = map.reduce_scalar(model.lumped_drag());
-    system.loads.force = Eigen::VectorXd::Zero(3 * model.point_count());
-    for (int i = 0; i < model.point_count(); ++i)
-      system.loads.force.segment<3>(3 * i) = model.lumped_mass()[i] * o.gravity;
+    system.loads.force = weight_of(model, o.gravity);
     renew();
     Eigen::VectorXd q(3 * model.point_count());
     for (int i = 0; i < model.point_count(); ++i) q.segment<3>(3 * i) = placed(i);
@@ -125,7 +123,10 @@ struct ContactScene {
     return met;
   }
 
-  Eigen::Vector3d at(double u, double v) const { return apply(model.place(0, u, v), state.q); }
+  // Of the material that is (x, y) [m] from the panel's corner.
+  Eigen::Vector3d at(double x, double y) const {
+    return apply(model.place(0, x / options.size, y / options.size), state.q);
+  }
   Eigen::Vector3d mean() const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (int i = 0; i < model.point_count(); ++i) sum += model.lumped_mass()[i] * state.q.segment<3>(3 * i);
@@ -147,7 +148,7 @@ struct ContactScene {
       for (const double v : grid(rest.v()))
         for (const auto& obstacle : obstacles) {
           const double skin = options.half_thickness + obstacle->thickness();
-          const auto near = obstacle->nearest(at(u, v), 1);
+          const auto near = obstacle->nearest(apply(model.place(0, u, v), state.q), 1);
           if (near) deepest = std::max(deepest, skin - near->distance);
         }
     return deepest;

@@ -61,10 +61,7 @@ struct Scene {
     system.map = &map;
     system.node_mass = map.reduce_scalar(model.lumped_mass());
     system.node_drag = map.reduce_scalar(model.lumped_drag());
-    system.loads.force = Eigen::VectorXd::Zero(3 * model.point_count());
-    if (o.gravity)
-      for (int i = 0; i < model.point_count(); ++i)
-        system.loads.force.segment<3>(3 * i) = model.lumped_mass()[i] * gravity;
+    system.loads.force = test::weight_of(model, o.gravity ? gravity : Eigen::Vector3d(0, 0, 0));
 
     ConstraintRows rows;
     std::vector<std::vector<ConstraintPoint>> points(1);

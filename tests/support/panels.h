@@ -38,6 +38,13 @@ class Random {
   std::uint64_t state_;
 };
 
+// Weight of every point of a body [N], 3 n.
+inline Eigen::VectorXd weight_of(const Body& body, const Eigen::Vector3d& gravity) {
+  Eigen::VectorXd force(3 * body.point_count());
+  for (int i = 0; i < body.point_count(); ++i) force.segment<3>(3 * i) = body.lumped_mass()[i] * gravity;
+  return force;
+}
+
 // n-point Gauss-Legendre abscissae and weights on [-1, 1], by Newton on the Legendre polynomial.
 inline std::vector<std::pair<double, double>> gauss_rule(int n) {
   std::vector<std::pair<double, double>> rule;
