@@ -426,6 +426,14 @@ const ContactRow* ContactProjection::worst() const {
              ? &impl_->rows[static_cast<std::size_t>(impl_->worst)]
              : nullptr;
 }
+ContactProjection::Counts& ContactProjection::Counts::operator+=(const Counts& more) {
+  steps += more.steps;
+  rounds += more.rounds;
+  sweeps += more.sweeps;
+  search_seconds += more.search_seconds;
+  sweep_seconds += more.sweep_seconds;
+  return *this;
+}
 const ContactProxy& ContactProjection::proxy() const {
   return impl_->proxy;
 }

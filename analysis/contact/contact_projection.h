@@ -64,8 +64,10 @@ class ContactProjection final : public ConstraintSolver {
   const ContactRow* worst() const;                  // the one farthest from its balance there; null: none
   const ContactProxy& proxy() const;
   struct Counts {
-    long steps = 0, rounds = 0, sweeps = 0, queries = 0;
+    long steps = 0, rounds = 0, sweeps = 0;
     double search_seconds = 0, sweep_seconds = 0;  // wall time
+    double seconds() const { return search_seconds + sweep_seconds; }
+    Counts& operator+=(const Counts& more);
   };
   const Counts& counts() const;
 

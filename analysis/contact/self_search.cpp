@@ -146,19 +146,20 @@ void SelfSearch::vertices_to_triangles(const Moved& m, int a, int b, std::vector
         return normal.dot(x.col(v) - x.col(i));
       };
       const double before = height(m.from), after = height(m.at);
-      double side = before < 0 ? -1 : 1, slack = 0;
+      double side = before < 0 ? -1 : 1;
+      std::optional<Vector3d> w;
       if (before * after < 0) {
-        // Through the triangle, or past it?
+        // Through the triangle: held where it passed, wherever it ends. Past it: on the side where it ends.
         const double part = before / (before - after);
         const auto there = [&](int n) -> Vector3d { return (1 - part) * m.from.col(n) + part * m.at.col(n); };
-        const auto then = weights_below(there(i), there(j), there(k), there(v));
-        if (then && then->minCoeff() >= -beyond)
-          slack = beyond;
-        else
-          side = -side;
+        w = weights_below(there(i), there(j), there(k), there(v));
+        if (w && w->minCoeff() < -beyond) w.reset();
+        if (!w) side = -side;
       }
-      const auto w = weights_below(m.at.col(i), m.at.col(j), m.at.col(k), m.at.col(v));
-      if (!w || w->minCoeff() < -slack) continue;
+      if (!w) {
+        w = weights_below(m.at.col(i), m.at.col(j), m.at.col(k), m.at.col(v));
+        if (!w || w->minCoeff() < 0) continue;
+      }
       SelfMeeting meeting;
       meeting.first = v;
       meeting.second = t;
@@ -180,10 +181,10 @@ void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMe
       const auto [r, s] = proxy_.edges()[static_cast<std::size_t>(f)];
       if (p == r || p == s || q == r || q == s) continue;
       const Vector3d along = m.at.col(q) - m.at.col(p), other = m.at.col(s) - m.at.col(r);
-      const auto shares = nearest_on_lines(m.at.col(p), along, m.at.col(r), other);
+      auto shares = nearest_on_lines(m.at.col(p), along, m.at.col(r), other);
       if (!shares) continue;
-      const auto [u, v] = *shares;
       const auto apart = [&, p = p, q = q, r = r, s = s](const Matrix3Xd& x) -> Vector3d {
+        const auto [u, v] = *shares;
         return (1 - u) * x.col(p) + u * x.col(q) - (1 - v) * x.col(r) - v * x.col(s);
       };
       Vector3d normal = along.cross(other).normalized();
@@ -194,11 +195,14 @@ void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMe
         const double part = before / (before - after);
         const auto there = [&](int n) -> Vector3d { return (1 - part) * m.from.col(n) + part * m.at.col(n); };
         const auto then = nearest_on_lines(there(p), there(q) - there(p), there(r), there(s) - there(r));
-        if (then && inside((*then)[0], beyond) && inside((*then)[1], beyond))
+        if (then && inside((*then)[0], beyond) && inside((*then)[1], beyond)) {
+          shares = then;
           slack = beyond;
-        else
+        } else {
           normal = -normal;
+        }
       }
+      const auto [u, v] = *shares;
       if (!inside(u, slack) || !inside(v, slack)) continue;
       SelfMeeting meeting;
       meeting.edges = true;
@@ -211,28 +215,33 @@ void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMe
   }
 }
 
-// With its offset, if that may be touched.
+// With its thickness and chord errors, if that may be touched.
 void SelfSearch::add(const Moved& m, SelfMeeting meeting, std::vector<SelfMeeting>& out) const {
+  const std::size_t of_first = meeting.edges ? 2 : 1;  // entries of `vertices`
   Vector3d now = Vector3d::Zero(), before = now, rest = now;
-  double first = 0, second = 0, first_chord = 0, second_chord = 0;
-  for (const auto& [vertex, share] : meeting.vertices) {
+  std::array<double, 2> half{}, chord{};
+  for (std::size_t k = 0; k < meeting.vertices.size(); ++k) {
+    const auto& [vertex, share] = meeting.vertices[k];
     now += share * m.at.col(vertex);
     before += share * m.from.col(vertex);
     rest += share * rest_.col(vertex);
-    double& half = share > 0 ? first : second;
-    half = std::max(half, proxy_.half_thickness(vertex));
+    double& own = half[k < of_first ? 0 : 1];
+    own = std::max(own, proxy_.half_thickness(vertex));
   }
-  const double gap = meeting.normal.dot(now), thickness = first + second;
-  if (gap > thickness + 2 * largest_chord_ + m.margin) return;
-  for (const auto& [vertex, share] : meeting.vertices) {
-    double& chord = share > 0 ? first_chord : second_chord;
-    chord = std::max(chord, proxy_.chord_error(vertex, m.at, share > 0 ? meeting.normal : Vector3d(-meeting.normal)));
+  meeting.thickness = half[0] + half[1];
+  const double gap = meeting.normal.dot(now);
+  if (gap > meeting.thickness + 2 * largest_chord_ + m.margin) return;
+  for (std::size_t k = 0; k < meeting.vertices.size(); ++k) {
+    const bool first = k < of_first;
+    double& own = chord[first ? 0 : 1];
+    const Vector3d out_of_cloth = first ? meeting.normal : Vector3d(-meeting.normal);
+    own = std::max(own, proxy_.chord_error(meeting.vertices[k].first, m.at, out_of_cloth));
   }
-  meeting.chord = std::min(first_chord, largest_chord_) + std::min(second_chord, largest_chord_);
-  meeting.thickness = thickness;
-  const double offset = thickness + meeting.chord;
+  meeting.chord = std::min(chord[0], largest_chord_) + std::min(chord[1], largest_chord_);
   meeting.distance = meeting.normal.dot(before);
-  if (gap > offset + m.margin || rest.norm() < offset + m.margin) return;
+  const double offset = meeting.thickness + meeting.chord;
+  const bool one_panel = proxy_.panel(meeting.vertices.front().first) == proxy_.panel(meeting.vertices.back().first);
+  if (gap > offset + m.margin || (one_panel && rest.norm() < offset)) return;
   out.push_back(std::move(meeting));
 }
 

@@ -24,8 +24,9 @@ struct SelfMeeting {
   double distance = 0;              // m along the normal, at the start
 };
 
-//   (1) found is what comes within offset + margin, and what passes through on straight ways [Provot 1997];
-//   (2) places that are within an offset of each other at rest don't meet;
+//   (1) found is what comes within offset + margin, and what passes through: where the two are in one plane, with
+//       heights that change in proportion to time [after Provot 1997, whose cubic is exact also where planes turn];
+//   (2) places of one panel that are within an offset of each other at rest don't meet;
 //   (3) neighbouring cells whose triangles face within a right angle of each other don't meet [Volino &
 //       Magnenat-Thalmann 1994]: flat cloth costs a box and a cone of normals a cell.
 class SelfSearch {

@@ -81,10 +81,10 @@ class RigidObstacle : public Obstacle {
   std::vector<Vector3d> own_vertices_, vertices_;
 };
 
-// Axes with their origin at `from`, z towards `to`.
-Isometry3d along(const Vector3d& from, const Vector3d& to) {
+// Axes with their origin at `from`, z along `direction`.
+Isometry3d along(const Vector3d& from, const Vector3d& direction) {
   Isometry3d axes = Isometry3d::Identity();
-  axes.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), to - from).toRotationMatrix();
+  axes.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), direction).toRotationMatrix();
   axes.translation() = from;
   return axes;
 }
@@ -122,7 +122,7 @@ TriangleMesh revolved_mesh(const std::vector<Vector2d>& meridian) {
 class PlaneObstacle final : public RigidObstacle {
  public:
   PlaneObstacle(const PlaneShape& s, ObstacleOptions o, RigidMotion m)
-      : RigidObstacle(std::move(o), along(s.point, s.point + s.normal), std::move(m)) {}
+      : RigidObstacle(std::move(o), along(s.point, s.normal), std::move(m)) {}
 
  private:
   Local local_nearest(const Vector3d& p) const override { return {{p.x(), p.y(), 0}, Vector3d::UnitZ(), p.z(), 0}; }
@@ -139,11 +139,15 @@ class PlaneObstacle final : public RigidObstacle {
 class CapsuleObstacle final : public RigidObstacle {
  public:
   CapsuleObstacle(const CapsuleShape& s, ObstacleOptions o, RigidMotion m)
-      : RigidObstacle(std::move(o), along(s.from, s.to), std::move(m)), length_((s.to - s.from).norm()), r_(s.radius) {
+      : RigidObstacle(std::move(o), along(s.from, s.to - s.from), std::move(m)),
+        length_((s.to - s.from).norm()),
+        r_(s.radius) {
     if (r_ > thin) return;
     const Vector3d end(0, 0, length_);
-    set_features(length_ > 0 ? std::vector<Segment>{{Vector3d::Zero(), end}} : std::vector<Segment>{},
-                 {Vector3d::Zero(), end});
+    if (length_ > 0)
+      set_features({{Vector3d::Zero(), end}}, {Vector3d::Zero(), end});
+    else
+      set_features({}, {end});
   }
   double sharp_radius() const override { return r_; }
 
@@ -174,13 +178,20 @@ class RevolvedObstacle final : public RigidObstacle {
       : RigidObstacle(std::move(o), own, std::move(m)), meridian_(std::move(meridian)) {
     std::vector<Segment> edges;
     std::vector<Vector3d> vertices;
-    for (const Vector2d& at : meridian_) {
-      if (at.x() == 0) continue;
-      const auto rim = [&](int k) -> Vector3d {
-        const double angle = 2 * std::numbers::pi * (k % rim_chords) / rim_chords;
-        return {at.x() * std::cos(angle), at.x() * std::sin(angle), at.y()};
-      };
-      for (int k = 0; k < rim_chords; ++k) edges.push_back({rim(k), rim(k + 1)});
+    const auto raised = [](const Vector2d& m, int k, int parts) -> Vector3d {
+      const double angle = 2 * std::numbers::pi * (k % parts) / parts;
+      return {m.x() * std::cos(angle), m.x() * std::sin(angle), m.y()};
+    };
+    for (const Vector2d& at : meridian_)
+      for (int k = 0; at.x() > 0 && k < rim_chords; ++k)
+        edges.push_back({raised(at, k, rim_chords), raised(at, k + 1, rim_chords)});
+    // A thin mantle passes between the cloth's sampled points.
+    double widest = 0;
+    for (const Vector2d& at : meridian_) widest = std::max(widest, at.x());
+    constexpr int lines = 8;
+    for (int k = 0; widest <= thin && k < lines; ++k) {
+      for (std::size_t i = 0; i + 1 < meridian_.size(); ++i)
+        edges.push_back({raised(meridian_[i], k, lines), raised(meridian_[i + 1], k, lines)});
     }
     // An end on the axis is sharp unless a flat face lies around it.
     const std::size_t n = meridian_.size();
@@ -315,17 +326,19 @@ std::unique_ptr<Obstacle> make_obstacle(const CylinderShape& s, ObstacleOptions 
   require_size(o, "length", (s.to - s.from).norm(), s.from, s.to);
   const double length = (s.to - s.from).norm();
   return std::make_unique<RevolvedObstacle>(
-      std::vector<Vector2d>{{0, 0}, {s.radius, 0}, {s.radius, length}, {0, length}}, along(s.from, s.to), std::move(o),
-      std::move(m));
+      std::vector<Vector2d>{{0, 0}, {s.radius, 0}, {s.radius, length}, {0, length}}, along(s.from, s.to - s.from),
+      std::move(o), std::move(m));
 }
 std::unique_ptr<Obstacle> make_obstacle(const ConeShape& s, ObstacleOptions o, RigidMotion m) {
   require_size(o, "radius", s.radius, s.base, s.tip);
   require_size(o, "height", (s.tip - s.base).norm(), s.base, s.tip);
   return std::make_unique<RevolvedObstacle>(std::vector<Vector2d>{{0, 0}, {s.radius, 0}, {0, (s.tip - s.base).norm()}},
-                                            along(s.base, s.tip), std::move(o), std::move(m));
+                                            along(s.base, s.tip - s.base), std::move(o), std::move(m));
 }
 std::unique_ptr<Obstacle> make_obstacle(const BoxShape& s, ObstacleOptions o, RigidMotion m) {
   require_size(o, "size", s.size.minCoeff(), s.centre, s.size);
+  if (!s.turned.allFinite() || !s.turned.isUnitary(1e-9))
+    throw GeometryError("obstacle '" + o.name + "': its axes aren't at right angles");
   return std::make_unique<BoxObstacle>(s, std::move(o), std::move(m));
 }
 

@@ -416,7 +416,7 @@ Build build(Scene scene) {
   }
   if (touches(result.scene)) {
     result.obstacles = build_obstacles(result.scene, result.warnings, result.notes);
-    result.proxies = contact_proxies(result, result.notes);
+    result.proxies = contact_proxies(result, result.warnings, result.notes);
   }
   for (const OutputPoint& point : result.scene.points) {
     const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(point.panel))];

@@ -9,22 +9,27 @@
 namespace toile {
 namespace {
 
-constexpr double fold_radius = 0.05;  // m, of folds that the chord is stated for
-constexpr int most_divisions = 16;
+constexpr double fold_radius = 0.05;   // m, of folds that the chord is stated for
+constexpr double most_divisions = 16;  // of a span
 
-// Parts of the longest span in each direction, so that points are no farther apart than `spacing`.
-std::pair<int, int> divisions(const NurbsSurface& rest, double spacing) {
-  const auto parts = [&](const KnotVector& along, const KnotVector& across, bool u) {
-    double longest = 0;
-    const std::vector<double> breaks = along.breaks();
-    for (const double c : across.breaks())
-      for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
-        const auto at = [&](double t) { return u ? rest(t, c) : rest(c, t); };
-        longest = std::max(longest, (at(breaks[k + 1]) - at(breaks[k])).norm());
-      }
-    return std::clamp(static_cast<int>(std::ceil(longest / spacing - 1e-6)), 1, most_divisions);
-  };
-  return {parts(rest.u(), rest.v(), true), parts(rest.v(), rest.u(), false)};
+// Of a span in each direction: the longest [m], and its parts so that points are no farther apart than `spacing`, if
+// that is not too fine.
+struct Division {
+  double longest = 0;
+  int parts = 1;
+  double reached() const { return longest / parts; }
+};
+Division division(const NurbsSurface& rest, Direction d, double spacing) {
+  const KnotVector &along = rest.knots(d), &across = rest.knots(d == Direction::u ? Direction::v : Direction::u);
+  const std::vector<double> breaks = along.breaks();
+  Division out;
+  for (const double c : across.breaks())
+    for (std::size_t k = 0; k + 1 < breaks.size(); ++k) {
+      const auto at = [&](double t) { return d == Direction::u ? rest(t, c) : rest(c, t); };
+      out.longest = std::max(out.longest, (at(breaks[k + 1]) - at(breaks[k])).norm());
+    }
+  out.parts = static_cast<int>(std::clamp(std::ceil(out.longest / spacing - 1e-6), 1.0, most_divisions));
+  return out;
 }
 
 // Of obstacles their own, of two panels the mean of theirs; of named pairs what the scene says.
@@ -51,19 +56,31 @@ void set_friction(const Build& build, ContactSearchOptions& options) {
 
 }  // namespace
 
-std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& notes) {
+std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& warnings,
+                                        std::vector<std::string>& notes) {
   const SceneContact& contact = build.scene.contact;
   const double spacing = contact.spacing.value_or(std::sqrt(8 * contact.chord * fold_radius));
   std::vector<ProxyPanel> out;
   std::size_t points = 0;
+  double widest = 0;
   for (std::size_t k = 0; k < build.panels.size(); ++k) {
     const BuiltPanel& panel = build.panels[k];
+    const NurbsSurface& rest = build.rest(static_cast<int>(k));
     const Fabric& fabric = build.model->panels()[k].fabric;
-    const auto parts = divisions(build.rest(static_cast<int>(k)), spacing);
-    out.push_back({triangulate_cells(panel.face, panel.topology, parts), fabric.thickness / 2, fabric.friction});
+    const Division u = division(rest, Direction::u, spacing), v = division(rest, Direction::v, spacing);
+    const double reached = std::max(u.reached(), v.reached());
+    widest = std::max(widest, reached);
+    if (reached > spacing * (1 + 1e-6))
+      warnings.push_back(fmt::format(
+          "{}: panel '{}': contact samples the cloth every {:.3g} mm, not every {:.3g} mm: its spans are too long for "
+          "that; a smaller span (refine) helps",
+          build.scene.panels[k].where, panel.name, 1e3 * reached, 1e3 * spacing));
+    out.push_back(
+        {triangulate_cells(panel.face, panel.topology, {u.parts, v.parts}), fabric.thickness / 2, fabric.friction});
     points += out.back().mesh.uv.size();
   }
-  notes.push_back(fmt::format("contact: {} points of the cloth, {:.3g} mm apart at most", points, 1e3 * spacing));
+  notes.push_back(
+      fmt::format("contact: {} points of the cloth, {:.3g} mm apart at most along its net", points, 1e3 * widest));
   return out;
 }
 

@@ -11,10 +11,11 @@
 
 namespace toile {
 
-// Sampled by [contact] spacing or chord; what is to be said is added to `notes`.
-std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& notes);
+// Sampled by [contact] spacing or chord; what is to be said is added to `warnings` and `notes`.
+std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& warnings,
+                                        std::vector<std::string>& notes);
 
-// `inner`: the other constraints, null for none. Both outlive neither `build` nor `map`.
+// `inner`: the other constraints, null for none. The result refers to `build` and `map`, which must outlive it.
 std::unique_ptr<ContactProjection> with_contact(const Build& build, const AffineMap& map,
                                                 const Eigen::VectorXd& node_mass, const Eigen::VectorXd& node_drag,
                                                 std::unique_ptr<ConstraintSolver> inner);

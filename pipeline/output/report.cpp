@@ -78,8 +78,10 @@ std::vector<std::pair<const char*, double>> energy_entries(const EnergyBalance& 
 
 namespace {
 
-double contact_seconds(const ContactProjection& contact) {
-  return contact.counts().search_seconds + contact.counts().sweep_seconds;
+ContactProjection::Counts contact_counts(const RunResult& run) {
+  ContactProjection::Counts counts = run.former_contact;
+  if (run.system->contact) counts += run.system->contact->counts();
+  return counts;
 }
 
 Json contact_json(const Build& build, const System& system, const RunResult& run, const StateMeasures& m) {
@@ -132,9 +134,9 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   report["seconds"] = {{"read", build.read_seconds},
                        {"trim", build.trim_seconds},
                        {"force", run.force_seconds},
-                       {"projection", run.projection_seconds},
+                       {"projection", run.projection_seconds - contact_counts(run).seconds()},
                        {"time_step", run.bound_seconds},
-                       {"contact", system.contact ? contact_seconds(*system.contact) : 0.0},
+                       {"contact", contact_counts(run).seconds()},
                        {"write", run.frame_seconds + write_seconds}};
   report["dt"] = {{"min", run.dt_min}, {"max", run.dt_max}};
   std::size_t points = 0, used = 0;
@@ -217,15 +219,13 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
   // What each stage that ran took. `seconds` above counts the same seconds, of stages that didn't run too.
   Json counters = {{"shell", {{"seconds", run.force_seconds}, {"bytes", build.model->table_bytes()}}}};
   if (system.strain_rows + system.place_rows > 0) {
-    counters["projection"] = {{"seconds", run.projection_seconds},
+    counters["projection"] = {{"seconds", run.projection_seconds - contact_counts(run).seconds()},
                               {"bytes", sizeof(double) * system.projection->factor_nonzeros()}};
   }
   if (system.contact) {
-    const ContactProjection::Counts& counts = system.contact->counts();
-    counters["contact"] = {{"seconds", contact_seconds(*system.contact)},
-                           {"steps", counts.steps},
-                           {"rounds", counts.rounds},
-                           {"sweeps", counts.sweeps}};
+    const ContactProjection::Counts counts = contact_counts(run);
+    counters["contact"] = {
+        {"seconds", counts.seconds()}, {"steps", counts.steps}, {"rounds", counts.rounds}, {"sweeps", counts.sweeps}};
   }
   counters["steps"] = {{"count", run.steps + run.redone_steps}};
   counters["time_step"] = {{"seconds", run.bound_seconds}};

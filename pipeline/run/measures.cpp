@@ -207,8 +207,10 @@ namespace {
 constexpr int points_per_cell = 7;    // each way, borders included
 constexpr double within_reach = 0.1;  // m: beyond it a distance isn't looked for
 
-ContactMeasures measure_contact(const Build& build, const System& system, const Eigen::VectorXd& q, double dt) {
+ContactMeasures measure_contact(const Build& build, const System& system, const Eigen::VectorXd& q, double t,
+                                double dt) {
   ContactMeasures m;
+  for (const auto& obstacle : build.obstacles) obstacle->move(t, t);
   m.distance = std::numeric_limits<double>::infinity();
   double worst = 0;  // over what is allowed
   for (std::size_t k = 0; k < build.panels.size(); ++k) {
@@ -229,16 +231,16 @@ ContactMeasures measure_contact(const Build& build, const System& system, const 
             if (kind == CellKind::cut && !contains(panel.face, panel.topology, uv)) continue;
             const Eigen::Vector3d at = apply(build.model->place(static_cast<int>(k), uv.x(), uv.y()), q);
             for (const auto& obstacle : build.obstacles) {
-              const auto near = obstacle->nearest(at, within_reach);
-              if (!near) continue;
+              auto near = obstacle->nearest(at, within_reach);
+              if (!near && obstacle->closed()) near = obstacle->nearest(at, HUGE_VAL);  // it may be deep inside
+              if (!near || near->distance > within_reach) continue;
               const double distance = obstacle->closed() ? near->distance : std::abs(near->distance);
               m.distance = std::min(m.distance, distance);
-              const double skin = thickness / 2 + obstacle->thickness(),
+              const double skin = thickness / 2 + obstacle->thickness(), depth = skin - distance,
                            allowed = 0.1 * (thickness + obstacle->thickness() + build.scene.contact.chord);
-              if (!(skin - distance > m.penetration)) continue;
-              m.penetration = skin - distance;
-              if (!((skin - distance) / allowed > worst)) continue;
-              worst = (skin - distance) / allowed;
+              if (!(depth > 0) || !(depth / allowed > worst)) continue;
+              worst = depth / allowed;
+              m.penetration = depth;
               m.allowed = allowed;
               m.where = fmt::format("panel '{}' at (u, v) = ({:.6g}, {:.6g}) and obstacle '{}'", panel.name, uv.x(),
                                     uv.y(), obstacle->name());
@@ -324,7 +326,7 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
       m.mass += area * panel.fabric.density;
     }
   }
-  if (system.contact && !build.obstacles.empty()) m.contact = measure_contact(build, system, q, dt);
+  if (system.contact && !build.obstacles.empty()) m.contact = measure_contact(build, system, q, state.t, dt);
   m.points = output_points(build, q);
   m.reactions = pin_reactions(build, system, state, dt);
   m.gaps.resize(build.scene.pins.size());

@@ -36,6 +36,7 @@ struct ShearExtremes {
 
 // How near cloth and obstacles are, by 7 x 7 points of the surface a cell.
 struct ContactMeasures {
+  // Of the place that is worst by what is allowed there.
   double penetration = 0;               // m: how far the cloth's surface is within half its thickness and the skin
   double allowed = 0;                   // m, there: 0.1 of the cloth's thickness, the skin and the chord error
   double distance = 0;                  // m, least, of the cloth's middle from an obstacle's surface; infinite: far

@@ -376,6 +376,7 @@ class Run::Impl {
     if (!any) return;
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
+    if (result_.system->contact) result_.former_contact += result_.system->contact->counts();
     result_.system = assemble(build_, t, hooks_.workers);
     result_.assembled = t;
     result_.state = state_from(*result_.system, q, v, t);

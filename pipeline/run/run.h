@@ -74,6 +74,7 @@ struct RunResult : RunState {
   std::optional<RunState> accepted;
   // Of this process alone, which began at `from` [s].
   double from = 0;
+  ContactProjection::Counts former_contact;  // of systems before the present one
   double wall_seconds = 0, force_seconds = 0, projection_seconds = 0, bound_seconds = 0, frame_seconds = 0;
 };
 
