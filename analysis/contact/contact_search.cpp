@@ -217,20 +217,20 @@ void ContactSearch::add_sharp(ContactRow row, const Vector3d& normal, const Vect
     cloth = std::max(cloth, proxy_.half_thickness(vertex));
   }
   row.normal = normal.dot(start - target) < 0 ? Vector3d(-normal) : normal;
-  row.target = target;
+  const double round = obstacle.sharp_radius();
+  row.target = target + round * row.normal;
   for (const auto& [vertex, share] : row.vertices)
     row.chord = std::max(row.chord, proxy_.chord_error(vertex, places_->at, row.normal));
   row.chord = std::min(row.chord, options_.largest_chord);
-  const double round = obstacle.sharp_radius();
-  row.offset = cloth + obstacle.thickness() + round;
-  const double offset = row.offset + row.chord, step = std::max(offset - round, least_offset);
-  if (row.normal.dot(sum_of(row, places_->at) - target) > offset + std::max(offset, least_offset)) return;
+  row.offset = cloth + obstacle.thickness();
+  const double offset = row.offset + row.chord, step = std::max(offset, least_offset);
+  if (row.normal.dot(sum_of(row, places_->at) - row.target) > offset + step) return;
   const auto before = obstacle.nearest(start, HUGE_VAL);
-  if (!before || before->distance < 0 || !leads_out(obstacle, target + round * row.normal, row.normal, step)) return;
-  row.distance = row.normal.dot(start - target);
+  if (!before || before->distance < -round || !leads_out(obstacle, row.target, row.normal, step)) return;
+  row.distance = row.normal.dot(start - row.target);
   row.anchor = start;
   row.feature = before->feature;
-  row.obstacle_move = obstacle.carry(target, row.feature) - target;
+  row.obstacle_move = obstacle.carry(row.target, row.feature) - row.target;
   row.friction = friction(proxy_.panel(row.vertices[0].first), index);
   set_nodes(proxy_, *places_, row);
   if (row.weight > 0) out.push_back(std::move(row));

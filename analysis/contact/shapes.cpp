@@ -178,9 +178,9 @@ class RevolvedObstacle final : public RigidObstacle {
       : RigidObstacle(std::move(o), own, std::move(m)), meridian_(std::move(meridian)) {
     std::vector<Segment> edges;
     std::vector<Vector3d> vertices;
-    const auto raised = [](const Vector2d& m, int k, int parts) -> Vector3d {
+    const auto raised = [](const Vector2d& profile, int k, int parts) -> Vector3d {
       const double angle = 2 * std::numbers::pi * (k % parts) / parts;
-      return {m.x() * std::cos(angle), m.x() * std::sin(angle), m.y()};
+      return {profile.x() * std::cos(angle), profile.x() * std::sin(angle), profile.y()};
     };
     for (const Vector2d& at : meridian_)
       for (int k = 0; at.x() > 0 && k < rim_chords; ++k)

@@ -127,6 +127,20 @@ struct ContactScene {
   Eigen::Vector3d at(double x, double y) const {
     return apply(model.place(0, x / options.size, y / options.size), state.q);
   }
+  // Where the cloth is over (x, y) [m] in space, looked for from the material that lay there.
+  Eigen::Vector3d above(double x, double y) const {
+    Eigen::Vector2d p(x - options.shift.x(), y - options.shift.y());
+    const Eigen::Vector2d goal(x, y);
+    constexpr double step = 1e-6;
+    for (int k = 0; k < 30; ++k) {
+      const Eigen::Vector2d here = at(p.x(), p.y()).head<2>();
+      Eigen::Matrix2d slope;
+      slope << (at(p.x() + step, p.y()).head<2>() - here) / step, (at(p.x(), p.y() + step).head<2>() - here) / step;
+      p += 0.5 * slope.inverse() * (goal - here);
+    }
+    EXPECT_LT((at(p.x(), p.y()).head<2>() - goal).norm(), 1e-6);
+    return at(p.x(), p.y());
+  }
   Eigen::Vector3d mean() const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (int i = 0; i < model.point_count(); ++i) sum += model.lumped_mass()[i] * state.q.segment<3>(3 * i);
