@@ -15,6 +15,7 @@
 #include "io/dxf/mirror.h"
 #include "io/dxf/pieces.h"
 #include "io/file.h"
+#include "io/limits.h"
 #include "io/outlines.h"
 #include "trimming/loops.h"
 
@@ -365,6 +366,10 @@ void DxfReader::add_panels(const Piece& piece, Outlines found) {
     panel.resolution = out_.resolution;
     panel.source = line_of(piece.items[static_cast<std::size_t>(found.ids[k])].line);
     const Interval u = panel.surface.u().domain(), v = panel.surface.v().domain();
+    if (!(std::max(u.length(), v.length()) <= largest_number)) {
+      refuse(piece.line, "piece '" + panel.name + "' is larger than 1e25 units: check the scales of its inserts");
+      continue;
+    }
     const double size = std::max(u.length(), v.length()) * out_.metres_per_unit;
     if (choice_.unit.empty() && (size > largest_piece || size < smallest_piece))
       out_.warnings.push_back(panel.source + ": piece '" + panel.name + "' is " + text(size) + " m large: is " +
@@ -471,6 +476,10 @@ void DxfReader::read(std::string_view text) {
     pieces = in_one_size(std::move(pieces), dxf::value_of(drawing, "sample size").value_or(""));
   }
   for (const Piece& piece : pieces) {
+    if (piece.cut)
+      warn(piece.line, "piece '" + piece.name +
+                           "': blocks are inserted in it more than 64 deep or too often; the others are left out: "
+                           "explode them before exporting");
     try {
       layered ? read_piece(piece) : read_plain(piece);
     } catch (const GeometryError& error) {
@@ -479,8 +488,14 @@ void DxfReader::read(std::string_view text) {
   }
   for (const auto& [type, count] : drawing.unread)
     out_.warnings.push_back(name_ + ": " + type + ": " + std::to_string(count) + " not read");
-  if (out_.panels.empty() && !out_.refused.empty()) throw GeometryError(out_.refused.front());
-  if (out_.panels.empty()) throw InputError(name_ + ": no piece with a closed boundary");
+  if (out_.panels.empty()) {
+    // What wasn't read is why, most likely.
+    std::string unread;
+    for (const std::string& warning : out_.warnings)
+      if (!warning.starts_with(name_ + ": ") && unread.size() < 400) unread += "; " + warning;
+    if (!out_.refused.empty()) throw GeometryError(out_.refused.front() + unread);
+    throw InputError(name_ + ": no piece with a closed boundary" + unread);
+  }
   name_panels();
 }
 

@@ -63,12 +63,21 @@ bool valid_utf8(std::string_view text) {
 }
 
 std::string to_utf8(const std::string& text, const std::string& codepage) {
-  if (valid_utf8(text)) return text;
+  return valid_utf8(text) ? text : from_codepage(text, codepage);
+}
+
+std::string from_codepage(const std::string& text, const std::string& codepage) {
   if (!codepage.empty()) {
     std::string out = converted(text, codepage);
     if (!out.empty()) return out;
   }
-  return from_latin1(text);
+  return valid_utf8(text) ? text : from_latin1(text);
+}
+
+bool several_bytes(std::string_view codepage) {
+  constexpr std::array<std::string_view, 8> names{"CP932", "CP949", "CP950",   "CP1361",
+                                                  "BIG5",  "JOHAB", "GB18030", "EUC-JP"};
+  return std::ranges::find(names, codepage) != names.end();
 }
 
 std::string codepage_of_dxf(std::string_view name) {
@@ -78,6 +87,7 @@ std::string codepage_of_dxf(std::string_view name) {
     if (!word.starts_with(prefix)) continue;
     const std::string number = word.substr(prefix.size());
     const bool digits = !number.empty() && std::ranges::all_of(number, [](unsigned char c) { return std::isdigit(c); });
+    if (number == "936" || number == "54936") return "GB18030";  // holds all of the older GBK
     return digits ? "CP" + number : std::string();
   }
   if (word.starts_with("iso8859-")) return "ISO-" + word.substr(3);

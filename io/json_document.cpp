@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "geometry/error.h"
+#include "io/encoding.h"
 
 namespace toile {
 
@@ -84,9 +85,16 @@ class Builder {
   bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception& error) {
     // "[json.exception.parse_error.101] parse error at line 3, column 7: what": the place is said in our way.
     std::string what = error.what();
+    if (const std::size_t end = what.find("] "); what.starts_with('[') && end != std::string::npos)
+      what = what.substr(end + 2);
     const std::size_t colon = what.find(": ");
     if (colon != std::string::npos) what = what.substr(colon + 2);
-    fail("no valid JSON: " + what);
+    // It quotes the file: whole, however long a number is.
+    constexpr std::size_t longest = 160;
+    if (what.size() > longest) what.replace(longest, std::string::npos, "...");
+    for (char& c : what)
+      if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = '?';
+    fail("no valid JSON: " + to_utf8(what));
   }
 
   [[noreturn]] void fail(const std::string& what) const {

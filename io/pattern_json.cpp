@@ -9,9 +9,11 @@
 #include "geometry/error.h"
 #include "geometry/refine.h"
 #include "geometry/text.h"
+#include "io/encoding.h"
 #include "io/file.h"
 #include "io/flat_panel.h"
 #include "io/json_document.h"
+#include "io/limits.h"
 #include "io/outline_repair.h"
 #include "trimming/loops.h"
 
@@ -71,6 +73,7 @@ class PatternReader {
   Curve2 curved(const JsonValue& value, const Vector2d& a, const Vector2d& b,
                 const std::vector<Vector2d>& params) const;
   Curve2 arc(const JsonValue& value, const Vector2d& a, const Vector2d& b, const JsonValue& params) const;
+  void sew(const JsonValue& stitches);
   void stitch(const JsonValue& value);
   std::optional<PatternEdge> edge_of(const JsonValue& value);
   std::vector<PatternEdge> side(const JsonValue& value);
@@ -96,8 +99,8 @@ class PatternReader {
 double PatternReader::number(const JsonValue& value, const std::string& what) const {
   expect(value, JsonValue::Kind::number, what);
   if (!std::isfinite(value.number)) fail(value, what + " must be finite");
-  // Squares and products of coordinates stay finite below this.
-  if (std::abs(value.number) > 1e100) fail(value, what + " is " + text(value.number) + ", too large for a length");
+  if (std::abs(value.number) > largest_number)
+    fail(value, what + " is " + text(value.number) + ", too large for a length: at most 1e25");
   return value.number;
 }
 
@@ -479,6 +482,24 @@ void PatternReader::check_gluing() {
   }
 }
 
+// A stitch that can't be is left out with a warning; the panels and the other stitches stay.
+void PatternReader::sew(const JsonValue& stitches) {
+  if (stitches.kind != JsonValue::Kind::array)
+    return warn(stitches,
+                std::string("'stitches' must be an array, not ") + stitches.kind_name() + "; nothing is sewn");
+  stitches_ = &stitches.items;
+  for (std::size_t k = 0; k < stitches.items.size(); ++k) {
+    where_ = "stitch " + std::to_string(k) + ": ";
+    try {
+      stitch(stitches.items[k]);
+    } catch (const InputError& error) {
+      out_.file.warnings.push_back(std::string(error.what()) + "; the stitch is left out");
+    }
+  }
+  where_.clear();
+  check_gluing();
+}
+
 void PatternReader::read(const JsonValue& root) {
   expect(root, JsonValue::Kind::object, "a pattern file");
   properties(root);
@@ -492,14 +513,7 @@ void PatternReader::read(const JsonValue& root) {
   if (out_.file.panels.empty() && first_refusal_) std::rethrow_exception(first_refusal_);
   if (out_.file.panels.empty()) fail(panels, "the pattern has no panels");
   const JsonValue* stitches = pattern.find("stitches");
-  if (stitches && stitches->kind != JsonValue::Kind::null) {
-    stitches_ = &expect(*stitches, JsonValue::Kind::array, "'stitches'").items;
-    for (std::size_t k = 0; k < stitches->items.size(); ++k) {
-      where_ = "stitch " + std::to_string(k) + ": ";
-      stitch(stitches->items[k]);
-    }
-    check_gluing();
-  }
+  if (stitches && stitches->kind != JsonValue::Kind::null) sew(*stitches);
   out_.soles_at_zero = objects_ || labels_;
 }
 
@@ -507,6 +521,17 @@ void PatternReader::read(const JsonValue& root) {
 
 Pattern parse_pattern(std::string_view text, const std::string& name) {
   Pattern out;
+  std::string converted;
+  if (!valid_utf8(text)) {
+    const bool wide = text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff");  // a byte order mark
+    converted = from_codepage(std::string(text), wide ? "UTF-16" : "");
+    text = converted;
+    if (!wide)
+      out.file.warnings.push_back(
+          name +
+          ": it isn't UTF-8, as JSON must be; it is read as Latin-1, so names may be wrong: save "
+          "it as UTF-8");
+  }
   const JsonValue root = parse_json(text, name);
   PatternReader(name, out).read(root);
   return out;

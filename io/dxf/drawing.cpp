@@ -4,6 +4,8 @@
 #include <dxflib/dl_creationadapter.h>
 #include <dxflib/dl_dxf.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <sstream>
@@ -13,6 +15,7 @@
 #include "io/dxf/pairs.h"
 #include "io/encoding.h"
 #include "io/flat_panel.h"
+#include "io/limits.h"
 
 namespace toile::dxf {
 
@@ -22,8 +25,28 @@ using Eigen::Vector2d;
 
 constexpr double degree = std::numbers::pi / 180;
 
+// "\M+5BAF3": the two bytes of a letter in the code page that the digit says.
+std::string with_page_escapes(const std::string& text) {
+  constexpr std::array<const char*, 5> pages{"CP932", "CP950", "CP949", "CP1361", "GB18030"};
+  std::string out;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const bool escape = text.compare(k, 3, "\\M+") == 0 && k + 8 <= text.size() && text[k + 3] >= '1' &&
+                        text[k + 3] <= '5' && text.find_first_not_of("0123456789abcdefABCDEF", k + 4) >= k + 8;
+    if (!escape) {
+      out += text[k];
+      continue;
+    }
+    const unsigned long code = std::stoul(text.substr(k + 4, 4), nullptr, 16);
+    const std::string bytes{static_cast<char>(code >> 8), static_cast<char>(code & 0xffu)};
+    out += from_codepage(bytes, pages[static_cast<std::size_t>(text[k + 3] - '1')]);
+    k += 7;
+  }
+  return out;
+}
+
 // "\U+00D6" is a letter by its number.
-std::string with_escapes(const std::string& text) {
+std::string with_escapes(const std::string& escaped) {
+  const std::string text = with_page_escapes(escaped);
   std::string out;
   for (std::size_t k = 0; k < text.size(); ++k) {
     unsigned code = 0;
@@ -49,12 +72,26 @@ std::string with_escapes(const std::string& text) {
   return out;
 }
 
+// Derivatives that are finite (io/limits.h).
+void require_moderate(const Spline& s) {
+  if (s.degree < 1) throw GeometryError("its degree is " + std::to_string(s.degree) + ", must be at least 1");
+  for (std::size_t k = 1; k < s.knots.size(); ++k)
+    if (const double span = s.knots[k] - s.knots[k - 1]; span > 0 && span < smallest_span)
+      throw GeometryError("its knots " + std::to_string(k - 1) + " and " + std::to_string(k) +
+                          " must be equal or at least 1e-25 apart");
+  if (s.weights.empty()) return;
+  const auto [least, most] = std::ranges::minmax(s.weights);
+  if (least > 0 && most > largest_weight_ratio * least)
+    throw GeometryError("its weights must be within a factor of 1e15");
+}
+
 class Listener : public DL_CreationAdapter {
  public:
   Listener(const Pairs& pairs, const std::string& name, Drawing& out) : pairs_(pairs), name_(name), out_(out) {
     out_.blocks.emplace_back();
     const auto codepage = pairs.header.find("$DWGCODEPAGE");
     if (codepage != pairs.header.end()) codepage_ = codepage_of_dxf(codepage->second);
+    of_codepage_ = several_bytes(codepage_) && !valid_utf8(pairs.text);
   }
 
   void addBlock(const DL_BlockData& data) override {
@@ -121,6 +158,7 @@ class Listener : public DL_CreationAdapter {
       if (!s.weights.empty() && s.weights.size() != s.points.size())
         throw GeometryError("it has " + std::to_string(s.weights.size()) + " weights for " +
                             std::to_string(s.points.size()) + " control points");
+      require_moderate(s);
       item_of_spline.curves.push_back(clamp(Curve2(KnotVector(s.degree, s.knots), std::move(points), s.weights)));
     } catch (const GeometryError& error) {
       out_.warnings.push_back(where + error.what() + "; it is not read");
@@ -140,7 +178,16 @@ class Listener : public DL_CreationAdapter {
       insert.map.linear.row(0) *= -1;
       insert.map.shift.x() *= -1;
     }
-    item("INSERT").insert = std::move(insert);
+    Item& placed = item("INSERT");
+    const auto warn = [&](const std::string& what) {
+      out_.warnings.push_back(name_ + ":" + std::to_string(placed.line) + ": INSERT: block '" + insert.block + "' " +
+                              what);
+    };
+    if (i.sx == 0 || i.sy == 0) warn("has the scale 0 and so no area");
+    if (current_ != 0 && (i.cols > 1 || i.rows > 1))
+      warn("is inserted " + std::to_string(i.cols) + " x " + std::to_string(i.rows) +
+           " times; the first is read: explode it before exporting");
+    placed.insert = std::move(insert);
   }
   void addText(const DL_TextData& t) override { add_text("TEXT", {t.ipx, t.ipy}, t.text); }
   void addMTextChunk(const std::string& chunk) override { mtext_ += chunk; }
@@ -151,7 +198,9 @@ class Listener : public DL_CreationAdapter {
 
  private:
   int next_line() { return announced_ < pairs_.lines.size() ? pairs_.lines[announced_++] : 0; }
-  std::string decoded(const std::string& text) const { return with_escapes(to_utf8(text, codepage_)); }
+  std::string decoded(const std::string& text) const {
+    return with_escapes(of_codepage_ ? from_codepage(text, codepage_) : to_utf8(text, codepage_));
+  }
   // Plane entities may be seen from below: x runs the other way.
   bool from_below() { return getExtrusion() && getExtrusion()->getDirection()[2] < 0; }
   Item& item(const char* type) {
@@ -180,7 +229,7 @@ class Listener : public DL_CreationAdapter {
   const std::string& name_;
   Drawing& out_;
   std::string codepage_, mtext_;
-  bool below_ = false;
+  bool below_ = false, of_codepage_ = false;
   std::size_t announced_ = 0, splines_ = 0, current_ = 0;
   Item* item_ = nullptr;  // the newest; polyline vertices follow at once
 };
@@ -242,6 +291,10 @@ Drawing read_drawing(std::string_view text, const std::string& name) {
   } catch (const GeometryError& error) {
     throw InputError(name + ": an arc: " + error.what());
   }
+  const auto page = pairs.header.find("$DWGCODEPAGE");
+  if (page != pairs.header.end() && !valid_utf8(pairs.text) && codepage_of_dxf(page->second).empty())
+    out.warnings.push_back(name + ": $DWGCODEPAGE '" + to_utf8(page->second) +
+                           "' is not known; text that isn't UTF-8 is read as Latin-1");
   out.header = std::move(pairs.header);
   out.unread = std::move(pairs.unread);
   return out;

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "geometry/error.h"
+#include "io/limits.h"
 
 namespace toile::dxf {
 
@@ -115,8 +116,9 @@ class Cutter {
         value.starts_with('+') ? std::string_view(value).substr(1) : std::string_view(value);
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
     if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(number) ||
-        std::abs(number) > 1e100)
-      fail("group code " + std::to_string(code) + " is '" + value.substr(0, 40) + "', must be a number");
+        std::abs(number) > largest_number)
+      fail("group code " + std::to_string(code) + " is '" + value.substr(0, 40) +
+           "', must be a number of at most 1e25 in size");
     return number;
   }
 

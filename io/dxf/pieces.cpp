@@ -14,8 +14,9 @@ namespace toile::dxf {
 
 namespace {
 
-constexpr std::size_t max_depth = 8;          // of blocks inserted in blocks
-constexpr std::size_t max_items = 2'000'000;  // of a piece, inserted ones included
+constexpr std::size_t max_depth = 64;           // of blocks inserted in blocks
+constexpr std::size_t max_inserts = 1'000'000;  // of all pieces: blocks within blocks double quickly
+constexpr std::size_t max_items = 2'000'000;    // of a piece, inserted ones included
 
 std::string lower(std::string text) {
   std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -32,12 +33,15 @@ class Expander {
     const auto found = blocks_.find(name);
     return found == blocks_.end() ? nullptr : found->second;
   }
-  std::vector<Item> items(const Block& block, const Affine& map, bool inserts = true) const {
+  std::vector<Item> items(const Block& block, const Affine& map, bool inserts = true) {
     std::vector<Item> out;
+    cut_ = false;
     std::vector<const Block*> within;
     add(block, map, inserts, within, out);
     return out;
   }
+  // Whether the newest items lack some that lie too deep or are too many.
+  bool cut() const { return cut_; }
   // A block's coordinates to those of where it is inserted.
   static Affine placing(const Insert& insert, const Block& block) {
     return insert.map * Affine{Eigen::Matrix2d::Identity(), -block.base};
@@ -46,22 +50,29 @@ class Expander {
  private:
   // `within`: the blocks that this one is inserted in; none of them is inserted again.
   void add(const Block& block, const Affine& map, bool inserts, std::vector<const Block*>& within,
-           std::vector<Item>& out) const {
+           std::vector<Item>& out) {
     within.push_back(&block);
     const bool identity = map.linear.isIdentity(0) && map.shift.isZero(0);
     for (const Item& item : block.items) {
-      if (out.size() >= max_items) return;
+      const bool full = out.size() >= max_items || inserts_ >= max_inserts;
+      cut_ = cut_ || full;
+      if (full) break;
       if (!item.insert) {
         out.push_back(identity ? item : mapped(map, item));
         continue;
       }
-      const Block* inner = inserts && within.size() <= max_depth ? find(item.insert->block) : nullptr;
-      if (inner && std::ranges::find(within, inner) == within.end())
-        add(*inner, map * placing(*item.insert, *inner), inserts, within, out);
+      const Block* inner = inserts ? find(item.insert->block) : nullptr;
+      if (!inner || std::ranges::find(within, inner) != within.end()) continue;
+      const bool deep = within.size() > max_depth;
+      cut_ = cut_ || deep;
+      ++inserts_;
+      if (!deep) add(*inner, map * placing(*item.insert, *inner), inserts, within, out);
     }
     within.pop_back();
   }
   std::map<std::string, const Block*> blocks_;
+  std::size_t inserts_ = 0;
+  bool cut_ = false;
 };
 
 bool says_no(const std::string& value) {
@@ -105,7 +116,7 @@ bool Piece::on_layer(std::string_view layer) const {
 }
 
 std::vector<Piece> pieces_of(const Drawing& drawing) {
-  const Expander expander(drawing);
+  Expander expander(drawing);
   std::vector<Piece> out;
   const Block& outside = drawing.blocks.front();
   out.push_back(piece_of(outside, expander.items(outside, {}, false)));
@@ -129,6 +140,7 @@ std::vector<Piece> pieces_of(const Drawing& drawing) {
     for (const Affine& way : ways) {
       Piece piece = piece_of(block, expander.items(block, way));
       piece.mirrored_insert = way.mirrors();
+      piece.cut = expander.cut();
       out.push_back(std::move(piece));
     }
   }

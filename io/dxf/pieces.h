@@ -18,6 +18,7 @@ struct Piece {
   int line = 0;
   std::vector<Item> items;
   bool mirrored_insert = false;
+  bool cut = false;     // blocks in it lie too deep or are too many: some are left out
   bool paired = false;  // a mirrored second one is cut
   int quantity = 1;
 

@@ -9,13 +9,29 @@
 #include "geometry/refine.h"
 #include "io/iges/entity.h"
 #include "io/iges/splines.h"
+#include "io/limits.h"
 
 namespace toile::iges {
 
 std::vector<double> read_knots(Parameters& in, int count) {
   std::vector<double> knots(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) knots[static_cast<std::size_t>(i)] = in.real("knot", i);
+  require_spans(in, knots, "knot");
   return knots;
+}
+
+void require_spans(const Parameters& in, const std::vector<double>& breaks, const char* what) {
+  constexpr double rounding = 1e-13;  // of numbers with all the digits of a double, some hundred steps
+  const auto [least, most] = std::ranges::minmax(breaks);
+  const double size = std::max(std::abs(least), std::abs(most));
+  if (most > least && most - least < rounding * size)
+    in.fail(std::string(what) + "s run from " + format_real(least) + " to " + format_real(most) +
+            ", too near to each other for their size: export it with parameters from 0");
+  for (std::size_t i = 1; i < breaks.size(); ++i)
+    if (const double span = breaks[i] - breaks[i - 1]; span > 0 && span < smallest_span)
+      in.fail(std::string(what) + "s " + std::to_string(i - 1) + " and " + std::to_string(i) + " are " +
+              format_real(span) +
+              " apart, must be equal or at least 1e-25 apart: export it with parameters from 0 to 1");
 }
 
 std::vector<double> read_weights(Parameters& in, int count) {
@@ -27,6 +43,10 @@ std::vector<double> read_weights(Parameters& in, int count) {
     all_one = all_one && w == 1;
     weights[static_cast<std::size_t>(i)] = w;
   }
+  const auto [least, most] = std::ranges::minmax(weights);
+  if (most > largest_weight_ratio * least)
+    in.fail("weights run from " + format_real(least) + " to " + format_real(most) +
+            ", must be within a factor of 1e15: points of so little weight have no effect");
   if (all_one) weights.clear();
   return weights;
 }

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "geometry/error.h"
+#include "io/limits.h"
 
 namespace toile::iges {
 
@@ -164,6 +165,7 @@ double Parameters::real(const char* what, int number, double otherwise) {
   if (token.text.empty()) return otherwise;
   const std::optional<double> value = token.is_string ? std::nullopt : parse_real(token.text);
   if (!value) fail_token(what, number, token.text, "a finite number");
+  if (std::abs(*value) > largest_number) fail_token(what, number, token.text, "a number of at most 1e25 in size");
   return *value;
 }
 

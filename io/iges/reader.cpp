@@ -11,6 +11,7 @@
 #include "io/iges/face_reading.h"
 #include "io/iges/marks.h"
 #include "io/iges/outline_reading.h"
+#include "io/limits.h"
 
 namespace toile {
 
@@ -23,6 +24,13 @@ void place(const Eigen::Affine3d& t, TrimmedSurface& panel) {
   for (TrimLoop& loop : panel.loops)
     for (TrimCurve& c : loop.curves)
       if (c.model) c.model = transformed(t, *c.model);
+}
+
+// Matrices and scales multiply what the records hold.
+void require_moderate(const TrimmedSurface& panel) {
+  if (const double size = panel.surface.points().cwiseAbs().maxCoeff(); !(size <= largest_number))
+    throw GeometryError("its control points reach " + format_real(size) +
+                        ", must stay below 1e25: check the matrices and scales that place it");
 }
 
 // Panels without a name take the directory's label where no other panel has it, else a number.
@@ -47,6 +55,7 @@ std::vector<TrimmedSurface> read_panels(Reading& reading, std::vector<std::strin
       const Eigen::Affine3d t = face_entity ? Eigen::Affine3d(face.placement * reading.transform(e)) : face.placement;
       for (TrimmedSurface& panel : panels_of(reading, e)) {
         place(t, panel);
+        require_moderate(panel);
         reading.sign(panel, e);
         panels.push_back(std::move(panel));
         entries.push_back(&e);

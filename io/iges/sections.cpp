@@ -13,6 +13,7 @@ namespace toile::iges {
 namespace {
 
 constexpr std::size_t section_column = 72;  // 0-based column of the section letter
+constexpr double smallest_scale = 1e-12;    // of a model, and its inverse the largest
 
 bool is_blank(char c) {
   return static_cast<unsigned char>(c) <= ' ';
@@ -212,10 +213,10 @@ void read_global(File& file, std::string_view text) {
   g.preprocessor = at(6);
   if (const std::string scale = at(13); !scale.empty()) {
     const std::optional<double> value = parse_real(scale);
-    if (value && *value > 0) {
+    if (value && *value >= smallest_scale && *value <= 1 / smallest_scale) {
       g.scale = *value;
     } else {
-      note("model scale is '" + printable(scale) + "', must be positive; 1 taken");
+      note("model scale is '" + printable(scale) + "', must be from 1e-12 to 1e12; 1 taken");
     }
   }
   const std::string flag = at(14), name = at(15);

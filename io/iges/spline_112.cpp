@@ -6,6 +6,7 @@
 
 #include "geometry/error.h"
 #include "io/iges/entity.h"
+#include "io/iges/splines.h"
 
 namespace toile::iges {
 
@@ -21,6 +22,7 @@ PowerSpline read_power_spline(Parameters& in) {
   for (int i = 0; i < n; ++i)
     if (!(spline.breaks[static_cast<std::size_t>(i)] < spline.breaks[static_cast<std::size_t>(i) + 1]))
       in.fail("breakpoint " + std::to_string(i + 1) + " does not lie beyond the one before it");
+  require_spans(in, spline.breaks, "breakpoint");
   for (int i = 0; i < 12 * n; ++i) spline.coefficients.push_back(in.real("coefficient of segment", i / 12));
   // Values and derivatives at the end, which the last segment says as well.
   for (int i = 0; i < 12 && in.left() > 0; ++i) spline.terminal.push_back(in.real("terminal value"));
@@ -108,6 +110,7 @@ PowerSurface read_power_surface(Parameters& in) {
       if (i > 0 && !((*breaks)[static_cast<std::size_t>(i) - 1] < breaks->back()))
         in.fail("breakpoint " + std::to_string(i) + " does not lie beyond the one before it");
     }
+  for (const auto* breaks : {&s.u, &s.v}) require_spans(in, *breaks, "breakpoint");
   const long long whole = 48LL * (m + 1) * (n + 1);
   const long long there = std::min<long long>(whole, in.left());
   for (long long i = 0; i < there; ++i)

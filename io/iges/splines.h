@@ -13,6 +13,9 @@ namespace toile::iges {
 
 std::vector<double> read_knots(Parameters& in, int count);
 
+// Refuses a span too short to divide by, and a whole domain that is all rounding of its own ends.
+void require_spans(const Parameters& in, const std::vector<double>& breaks, const char* what);
+
 // Knots that occur too often: control points that no span sees (knots more than degree + 1 times), and the second of
 // two equal ones at a knot that occurs degree + 1 times inside. `same(i, j)` says whether control points i and j are
 // equal. Returns those to leave out, ascending; their knots are taken out of `knots`.

@@ -8,6 +8,7 @@
 #include "geometry/error.h"
 #include "geometry/refine.h"
 #include "geometry/surface_fit.h"
+#include "io/iges/splines.h"
 #include "io/iges/surfaces.h"
 
 namespace toile::iges {
@@ -274,6 +275,7 @@ Revolution read_revolution(Parameters& in) {
   revolution.generatrix = in.pointer("C");
   revolution.start = in.real("SA");
   revolution.end = in.real("TA", -1, 2 * std::numbers::pi);
+  require_spans(in, {revolution.start, revolution.end}, "angle");
   return revolution;
 }
 

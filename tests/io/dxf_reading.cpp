@@ -402,6 +402,24 @@ TEST(Dxf, ABlockWithinItselfIsReadOnce) {
   EXPECT_EQ(around.warnings.size(), 3u);
 }
 
+// Twenty blocks around the outline; forty that double without an end.
+TEST(Dxf, BlocksInBlocksAreReadOrNamed) {
+  std::string chain = block("B20", poly("1", rectangle, true));
+  for (int k = 19; k >= 0; --k) chain = block("B" + std::to_string(k), insert("B" + std::to_string(k + 1))) + chain;
+  const PanelFile deep = parse_dxf(file(chain, insert("B0") + metric), "p.dxf");
+  ASSERT_EQ(deep.panels.size(), 1u);
+  EXPECT_TRUE(deep.warnings.empty()) << deep.warnings[0];
+  std::string bomb = block("A", poly("1", rectangle, true) + insert("C0"));
+  for (int k = 0; k < 40; ++k)
+    bomb += block("C" + std::to_string(k), insert("C" + std::to_string(k + 1)) + insert("C" + std::to_string(k + 1)));
+  const PanelFile many = parse_dxf(file(bomb + block("C40", ""), insert("A") + metric), "p.dxf");
+  ASSERT_EQ(many.panels.size(), 1u);
+  EXPECT_NE(many.warnings.at(0).find("piece 'A': blocks are inserted in it more than 64 deep or too often"),
+            std::string::npos);
+  expect_error(file(block("A", poly("1", rectangle, true)), insert("A", " 41\n0\n") + metric),
+               "INSERT: block 'A' has the scale 0");
+}
+
 TEST(Dxf, VerticesOfAFittedPolylinesFrameAreNoCorners) {
   // The curve's vertices after the frame's, told by bit 16 of their flags.
   std::string fitted = "  0\nPOLYLINE\n  8\n1\n 66\n1\n 70\n5\n 75\n6\n";
@@ -499,6 +517,13 @@ TEST(Dxf, SplinesAndEllipsesAreExact) {
       parse_dxf(file(block("A", poly("1", rectangle, true) + head + " 11\n5\n 21\n5\n"), metric), "f.dxf");
   ASSERT_EQ(fit.warnings.size(), 1u);
   EXPECT_NE(fit.warnings[0].find("SPLINE: it has 1 fit points and no control points"), std::string::npos);
+  // Derivatives that aren't finite, and an outline that the unread curve leaves open: both are said.
+  std::string tiny = knots;
+  for (std::size_t at; (at = tiny.find("\n1\n")) != std::string::npos;) tiny.replace(at, 3, "\n1e-300\n");
+  expect_error(file(block("A", edges + head + tiny + points), metric),
+               "SPLINE: its knots 3 and 4 must be equal or at least 1e-25 apart; it is not read");
+  expect_error(file(block("A", edges + head + knots + points + " 41\n1\n 41\n1e20\n 41\n1\n 41\n1\n"), metric),
+               "its weights must be within a factor of 1e15");
 }
 
 TEST(Dxf, AnOpenBoundaryIsNamedWithItsGap) {
@@ -550,6 +575,22 @@ TEST(Dxf, NamesAreUtf8WhateverTheFileIsWrittenIn) {
   EXPECT_EQ(name("\\U+00C4RMEL"), "\u00c4RMEL");
   EXPECT_EQ(name("\xd0\xf3\xea\xe0\xe2", "ANSI_1251"), "\u0420\u0443\u043a\u0430\u0432");
   EXPECT_EQ(name("\xba\xf3\xc6\xac", "ANSI_936"), "\u540e\u7247");
+  EXPECT_EQ(name("\xc9\xcf\xd2\xc2 M", "GB2312"), "\u4e0a\u8863 M");
+  EXPECT_EQ(name("\x91O", "ANSI_932"), "\u524d");
+  EXPECT_EQ(name("\xbe\xd5", "ANSI_949"), "\uc55e");
+  EXPECT_EQ(name("\xab\x65", "ANSI_950"), "\u524d");
+  EXPECT_EQ(name("\\M+5BAF3\\U+7247", "ANSI_1252"), "\u540e\u7247");
+  // Two letters whose bytes are UTF-8 as well: the rest of the file says what it is.
+  EXPECT_EQ(name("\xc4\xa3", "ANSI_936"), "\u0123") << "all of the file is UTF-8";
+  const std::string mixed =
+      block("A", words("Piece Name: \xc4\xa3") + words("Material: \xba\xf3\xc6\xac") + poly("1", rectangle, true));
+  EXPECT_EQ(parse_dxf(file(mixed, metric, "  9\n$DWGCODEPAGE\n  3\nANSI_936\n"), "n.dxf").panels.at(0).name, "\u6a21");
+  const PanelFile unknown = parse_dxf(file(block("A", words("Piece Name: \xc4RMEL") + poly("1", rectangle, true)),
+                                           metric, "  9\n$DWGCODEPAGE\n  3\nrunes\n"),
+                                      "n.dxf");
+  EXPECT_EQ(unknown.panels.at(0).name, "\u00c4RMEL");
+  EXPECT_EQ(unknown.warnings.at(0),
+            "n.dxf: $DWGCODEPAGE 'runes' is not known; text that isn't UTF-8 is read as Latin-1");
 }
 
 TEST(Dxf, AByteOrderMarkIsNoPartOfTheFile) {

@@ -29,6 +29,13 @@ TEST(Encoding, CodePagesOfDxfHaveNames) {
   EXPECT_EQ(codepage_of_dxf("ANSI_1252"), "CP1252");
   EXPECT_EQ(codepage_of_dxf("dos850"), "CP850");
   EXPECT_EQ(codepage_of_dxf("iso8859-1"), "ISO-8859-1");
+  // Every page that such files name is one that the system converts: its letters aren't Latin-1's.
+  for (const char* page : {"ANSI_874",  "ANSI_932",  "ANSI_936",  "ANSI_949",  "ANSI_950",  "ANSI_1250", "ANSI_1251",
+                           "ANSI_1253", "ANSI_1254", "ANSI_1256", "ANSI_1257", "ANSI_1258", "gb2312",    "big5",
+                           "ksc5601",   "dos437",    "dos850",    "dos866",    "iso8859-5", "mac-roman"})
+    EXPECT_NE(to_utf8("\xbb\xd0\xe3\xbd\xda\xe9\xd0\xd0", codepage_of_dxf(page)),
+              to_utf8("\xbb\xd0\xe3\xbd\xda\xe9\xd0\xd0"))
+        << page;
   EXPECT_EQ(codepage_of_dxf("ascii"), "");
   EXPECT_EQ(codepage_of_dxf("ANSI_"), "");
 }

@@ -40,7 +40,7 @@ inline bool has_warning(const PanelFile& file, const std::string& part) {
                      [&](const std::string& w) { return w.find(part) != std::string::npos; });
 }
 
-// The file with more entities at its end, each a record on one line ("102,2,1,3;").
+// The file with more entities at its end, each a record ("102,2,1,3;").
 inline std::string with_entities(const std::string& text, const std::vector<std::string>& records) {
   std::vector<std::string> lines;
   for (std::size_t at = 0, end = 0; at < text.size(); at = end + 1) {
@@ -62,14 +62,23 @@ inline std::string with_entities(const std::string& text, const std::vector<std:
       return data + section + padded(std::to_string(number), 7);
     };
     const std::string first = type + padded(std::to_string(parameters + 1), 8) + std::string(48, ' ') + "00000000";
-    const std::string second = type + none + none + one + (type == padded("406", 8) ? padded("15", 8) : one);
-    std::string data = record;
-    data.resize(64, ' ');
+    std::vector<std::string> data{""};
+    for (std::size_t at = 0, end = 0; at < record.size(); at = end) {
+      end = std::min(record.find(',', at), record.size() - 1) + 1;
+      if (data.back().size() + end - at > 64) data.emplace_back();
+      data.back() += record.substr(at, end - at);
+    }
+    const std::string count = padded(std::to_string(data.size()), 8);
+    const std::string second = type + none + none + count + (type == padded("406", 8) ? padded("15", 8) : one);
     const auto after_directory = std::find_if(lines.begin(), lines.end(), is('P'));
     const auto at = lines.insert(after_directory, line(first, 'D', directory + 1));
     lines.insert(at + 1, line(second, 'D', directory + 2));
-    const auto after_parameters = std::find_if(lines.rbegin(), lines.rend(), is('P')).base();
-    lines.insert(after_parameters, line(data + padded(std::to_string(directory + 1), 8), 'P', parameters + 1));
+    for (std::size_t k = 0; k < data.size(); ++k) {
+      data[k].resize(64, ' ');
+      const auto after_parameters = std::find_if(lines.rbegin(), lines.rend(), is('P')).base();
+      lines.insert(after_parameters, line(data[k] + padded(std::to_string(directory + 1), 8), 'P',
+                                          parameters + 1 + static_cast<std::ptrdiff_t>(k)));
+    }
   }
   std::string out;
   for (const std::string& line : lines) out += line + '\n';

@@ -107,6 +107,33 @@ TEST(IgesRobustness, HugeCountsAreRefusedAndTheFaceBesideThemStays) {
   }
 }
 
+// A surface of its own with these knots, weights and x of its corners.
+std::string one_surface(const std::string& knots, const std::string& weight, const std::string& x) {
+  const std::size_t last = knots.rfind(',');
+  return test::with_entities(
+      test::corpus_text("clockwise"),
+      {"128,1,1,1,1,0,0,1,0,0," + knots + ",0,0,1,1," + weight + ",1,1,1,0,0,0," + x + ",0,0,0,9,0," + x + ",9,0," +
+       knots.substr(0, knots.find(',')) + "," + knots.substr(last + 1) + ",0,1;"});
+}
+
+// Derivatives are lengths over spans: what has none that is finite is refused with its line and what to do.
+TEST(IgesRobustness, NumbersWithoutFiniteDerivativesAreRefused) {
+  const auto refused = [](const std::string& text, const std::string& reason) {
+    const PanelFile file = parse_iges(text, "n.igs");
+    EXPECT_EQ(file.panels.size(), 1u) << "the face beside it stays: " << reason;
+    EXPECT_TRUE(test::has_warning(file, "entity 128: " + reason)) << testing::PrintToString(file.warnings);
+  };
+  EXPECT_EQ(parse_iges(one_surface("0,0,1,1", "1", "9"), "n.igs").panels.size(), 2u);
+  EXPECT_EQ(parse_iges(one_surface("0,0,1e-9,1e-9", "1", "9"), "n.igs").panels.size(), 2u);
+  refused(one_surface("0,0,1e-300,1e-300", "1", "9"), "knots 1 and 2 are 1.E-300 apart, must be equal or at least");
+  refused(one_surface("0,0,1e-160,1e-160", "1", "9"), "knots 1 and 2 are 1.E-160 apart, must be equal or at least");
+  refused(one_surface("1,1,1.00000000000001,1.00000000000001", "1", "9"), "knots run from 1. to 1.00000000000001, too");
+  refused(one_surface("0,0,1e300,1e300", "1", "9"), "knot 2 is '1e300', must be a number of at most 1e25 in size");
+  refused(one_surface("0,0,1,1", "1e-300", "9"), "weights run from 1.E-300 to 1., must be within a factor of 1e15");
+  refused(one_surface("0,0,1,1", "1", "1e150"),
+          "coordinate of control point 1 is '1e150', must be a number of at most");
+}
+
 // What tests/fuzz/run found, each within a second of processor time as the program ships; the name says what it was.
 TEST(IgesRobustness, FindingsOfTheFuzzerStayFixed) {
 #if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__) && !defined(__clang__)

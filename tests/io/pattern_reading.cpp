@@ -254,6 +254,44 @@ TEST(Pattern, ABadPanelIsLeftOutAndNamed) {
   EXPECT_THROW(parse_pattern(alone, "s.json"), GeometryError);
 }
 
+TEST(Pattern, ABadStitchIsLeftOutAndNamed) {
+  const std::string good = ",\n[" + edge("a", 1) + "," + edge("b", 3) + "]";
+  const auto bad = [&](const std::string& stitch, const std::string& reason) {
+    const Pattern pattern = parse_pattern(squares(2, stitch + good), "s.json");
+    EXPECT_EQ(pattern.file.panels.size(), 2u);
+    ASSERT_EQ(pattern.stitches.size(), 1u) << stitch;
+    EXPECT_EQ(pattern.stitches[0].line, 4);
+    ASSERT_EQ(pattern.file.warnings.size(), 1u) << stitch;
+    EXPECT_EQ(pattern.file.warnings[0], "s.json:3: stitch 0: " + reason + "; the stitch is left out");
+  };
+  bad("[" + edge("a", 3) + "," + edge("q", 1) + "]", "there is no panel 'q'");
+  bad("[" + edge("a", 3) + "," + edge("b", 9) + "]", "'edge' of panel 'b' is 9, must be a whole number from 0 to 3");
+  bad("[" + edge("a", 3) + "," + edge("b", -1) + "]", "'edge' of panel 'b' is -1, must be a whole number from 0 to 3");
+  bad("[" + edge("a", 3) + ", {\"panel\": \"b\"}]", "'edge' is missing");
+  bad("[" + edge("a", 3) + ", {\"panel\": 1, \"edge\": 1}]", "'panel' must be a string, not a number");
+  bad("[" + edge("a", 3) + ", 7]", "a side must be an object, not a number");
+  bad("[" + edge("a", 3) + "]", "it has 1 sides, must have 2");
+  bad("[" + edge("a", 3) + "," + edge("a", 3) + "]", "it joins an edge with itself");
+  bad("{}", "a stitch must be an array, not an object");
+  std::string none = squares(2, "");
+  none.replace(none.find("[]"), 2, "{}");
+  const Pattern pattern = parse_pattern(none, "s.json");
+  EXPECT_EQ(pattern.file.panels.size(), 2u);
+  EXPECT_EQ(pattern.file.warnings.at(0), "s.json:3: 'stitches' must be an array, not an object; nothing is sewn");
+}
+
+TEST(Pattern, NamesAreUtf8WhateverTheFileIsWrittenIn) {
+  std::string text = squares(1, "");
+  text.replace(text.find("\"a\""), 3, "\"\xc4rmel\"");
+  const PanelFile file = parse_pattern(text, "s.json").file;
+  EXPECT_EQ(file.panels.at(0).name, "\u00c4rmel");
+  ASSERT_EQ(file.warnings.size(), 1u);
+  EXPECT_NE(file.warnings[0].find("s.json: it isn't UTF-8"), std::string::npos);
+  std::string wide = "\xff\xfe";
+  for (const char c : squares(1, "")) wide += {c, '\0'};
+  EXPECT_EQ(parse_pattern(wide, "s.json").file.panels.at(0).name, "a") << "UTF-16";
+}
+
 TEST(Pattern, AnEdgeDrawnOutAndBackIsASlit) {
   std::string text = squares(1, "");
   text.replace(text.find("[40, 40]"), 8, "[40, 40], [40, 20], [30, 20]");
@@ -286,6 +324,7 @@ TEST(Pattern, WhatIsWrongIsNamedWithItsLine) {
     return text.replace(text.find(old), old.size(), replacement);
   };
   expect_error("", "p.json:1: no valid JSON");
+  expect_error("{\"a\": 4" + std::string(400, '0') + "}", "p.json:1: no valid JSON: number overflow parsing '4000");
   expect_error("[]", "p.json:1: a pattern file must be an object, not an array");
   expect_error("{\"pattern\": 3}", "'pattern' must be an object, not a number");
   expect_error("{\"pattern\": {}}", "'panels' is missing");
@@ -305,13 +344,6 @@ TEST(Pattern, WhatIsWrongIsNamedWithItsLine) {
   expect_error(with("100", "0"), "'units_in_meter' is 0, must be positive");
   expect_error(with("\"p\": {", "\"p\": {}, \"p\": {"), "key 'p' stands twice");
   expect_error(std::string(100, '['), "nested more than 64 levels deep");
-  std::string stitched = good;
-  stitched.replace(stitched.size() - 3, 3,
-                   "},\n\"stitches\": [[{\"panel\": \"q\", \"edge\": 0}, {\"panel\": \"p\", \"edge\": 1}]]}}");
-  expect_error(stitched, "p.json:7: stitch 0: there is no panel 'q'");
-  stitched.replace(stitched.find("\"q\""), 3, "\"p\"");
-  stitched.replace(stitched.find("\"edge\": 1}]"), 9, "\"edge\": 9");
-  expect_error(stitched, "'edge' of panel 'p' is 9, must be a whole number from 0 to 1");
 }
 
 TEST(Pattern, ATruncatedFileIsRefusedWithItsPlace) {
