@@ -201,11 +201,12 @@ StressField::StressField(const Body& body, const AffineMap& map, const Constrain
   const int unknowns = 3 * n + 3 * place.free.size();
   Triplets other;
   for (int r = 0; r < place.free.size(); ++r) {
+    const Eigen::Vector3d& axes = rows.place[static_cast<std::size_t>(r)].axes;
     double size = 0;
     for (int e = place.free.start[r]; e < place.free.start[r + 1]; ++e) {
       size += place.free.value[e] * place.free.value[e];
       for (int a = 0; a < 3; ++a)
-        sum.forces.emplace_back(3 * place.free.column[e] + a, 3 * (n + r) + a, place.free.value[e]);
+        if (axes[a] != 0) sum.forces.emplace_back(3 * place.free.column[e] + a, 3 * (n + r) + a, place.free.value[e]);
     }
     for (int a = 0; a < 3; ++a)
       other.emplace_back(3 * (n + r) + a, 3 * (n + r) + a, size > 0 ? dependent * size / h2 : 1);

@@ -31,10 +31,11 @@ std::vector<ThreadStress> row_stress(const Body& body, const ConstraintRows& row
 //                                        + rows / h^2 sum area (S along the row's thread - row_stress())^2)
 // where f are the forces on free nodes, A S those of a stress S (by the model's quadrature; y1, y2: threads at q)
 //   (A S)_I = - integral of S1 y1 N_I,1 + S2 y2 N_I,2 + S12 (y1 N_I,2 + y2 N_I,1),
-// B r what place rows may take up, unknown, and h^2 the median of the nodes' areas. Forces on nodes are right however
-// the limit divides a load among its rows; the shear and the rows decide where pins hold both ends of a thread.
-//   (1) a uniform stress comes back as it is; (2) what place rows and fixed control points take up changes nothing;
-//   (3) nor do the areas of the rows, but for what forces leave open.
+// B r what place rows may take up along the axes that they hold, unknown, and h^2 the median of the nodes' areas.
+// Forces on nodes are right however the limit divides a load among its rows; the shear and the rows decide where pins
+// hold both ends of a thread.
+//   (1) a uniform stress comes back as it is; (2) what place rows and fixed control points take up changes nothing, a
+//   row that holds some axes along these alone; (3) nor do the areas of the rows, but for what forces leave open.
 // Peaks of a few cells' width are smoothed, at points pinned alone and beside small holes.
 class StressField {
  public:

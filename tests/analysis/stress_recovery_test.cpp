@@ -186,5 +186,36 @@ TEST(StressRecovery, WhatPinsTakeUpDoesNotCount) {
     }
 }
 
+// A force in the plane of flat cloth, at a pin there: it is stress unless the pin holds it.
+TEST(StressRecovery, PinsThatHoldSomeAxesTakeUpForcesAlongTheseAlone) {
+  const Limited l = limited(square(2, 8));
+  const Eigen::VectorXd& q = l.model.rest();
+  const AffineMap map(AffineMap::identity(l.model.point_count()), {0, 1}, [&](std::size_t k, double) {
+    return Eigen::Vector3d(q.segment<3>(3 * static_cast<Eigen::Index>(k)));
+  });
+  const ScalarRow spot = l.model.place(0, 0.55, 0.62);
+  const auto stress = [&](const std::vector<Eigen::Vector3d>& pins, const Eigen::Vector3d& force) {
+    ConstraintRows rows;
+    rows.strain.push_back({spot, 0, 0, true, 1, 1, {0.55, 0.62}, {0, 1}});
+    for (const Eigen::Vector3d& axes : pins)
+      rows.place.push_back({spot, 0, [&](double) { return apply(spot, q); }, axes});
+    const StressField field(l.model, map, rows, force, q, {.rows = 0});
+    Eigen::Matrix3Xd out(3, 0);
+    for (const double u : {0.0, 0.3, 0.6, 1.0})
+      for (const double v : {0.0, 0.5, 0.65, 1.0}) {
+        out.conservativeResize(3, out.cols() + 1);
+        out.rightCols(1) = field.second_pk(0, u, v);
+      }
+    return out;
+  };
+  const Eigen::Vector3d x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+  const Eigen::Matrix3Xd unheld = stress({}, x);
+  const double size = unheld.norm();
+  ASSERT_GT(size, 1);
+  EXPECT_LT((stress({z}, x) - unheld).norm(), 1e-6 * size);
+  EXPECT_LT(stress({x}, x).norm(), 0.01 * size);
+  EXPECT_LT((stress({x, y, z}, x + y) - stress({Eigen::Vector3d::Ones()}, x + y)).norm(), 1e-6 * size);
+}
+
 }  // namespace
 }  // namespace toile
