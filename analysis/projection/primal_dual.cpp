@@ -10,6 +10,7 @@
 #include "analysis/constraint/composed_rows.h"
 #include "analysis/parallel/workers.h"
 #include "analysis/projection/fast_projection.h"
+#include "analysis/projection/force_norm.h"
 #include "analysis/projection/row_matrix.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
@@ -121,7 +122,6 @@ struct PrimalDual::Impl {
   double pull(int r) const { return lambda[r] + friction[r] * (strain[r] - strain_before[r]); }
   void measure(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void add_forces_of_rows(Eigen::VectorXd& f);
-  double weighted_norm(const Eigen::VectorXd& f) const;
   double excess(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report);
   void set_slopes();
   void set_matrix();
@@ -174,12 +174,6 @@ void PrimalDual::Impl::add_forces_of_rows(Eigen::VectorXd& f) {
   matrix.spread(row_force, f);
 }
 
-double PrimalDual::Impl::weighted_norm(const Eigen::VectorXd& f) const {
-  double sum = 0;
-  for (int k = 0; k < mass.size(); ++k) sum += f.segment<3>(3 * k).squaredNorm() / mass[k];
-  return std::sqrt(sum);
-}
-
 // What is left of a step's equations over what is allowed; sets force and missed.
 double PrimalDual::Impl::excess(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
   measure(x, report);
@@ -192,7 +186,7 @@ double PrimalDual::Impl::excess(const Eigen::Ref<const Eigen::VectorXd>& x, Proj
   });
   const double per = 1 / (tau * tau);
   for (int k = 0; k < mass.size(); ++k) force.segment<3>(3 * k) = per * mass[k] * (x - guess).segment<3>(3 * k);
-  const double inertia = weighted_norm(force);
+  const double inertia = force_norm(force, mass);
   add_forces_of_rows(force);
   if (smooth) smooth->add_gradient(x, force);
   allowed = std::max(options.force_residual * std::max(reference, inertia), rounding);
@@ -203,7 +197,7 @@ double PrimalDual::Impl::excess(const Eigen::Ref<const Eigen::VectorXd>& x, Proj
     largest = std::max(largest, std::abs(strain[r]) / narrow(r));
   }
   report.residual = of_law;
-  const double of_force = std::max(weighted_norm(force) - rounding, 0.0) / allowed;
+  const double of_force = std::max(force_norm(force, mass) - rounding, 0.0) / allowed;
   const double of_largest = of_law / std::clamp(largest, least_strain, 1.0);
   const double left = std::max({of_force, of_largest / options.law_residual, near_wall / options.wall_residual,
                                 report.place_violation / options.place_tolerance});
@@ -332,7 +326,7 @@ bool PrimalDual::Impl::search(Eigen::Ref<Eigen::VectorXd> x, ProjectionReport& r
     by_strain();
     excess(x, report);
     // By the law as it goes on beyond the wall.
-    const double left = weighted_norm(force) / allowed;
+    const double left = force_norm(force, mass) / allowed;
     if (left <= 1 && report.place_violation <= options.place_tolerance) {
       each_row([&](int r) { lambda[r] = takes_part(r) ? law(r).force(strain[r]) : 0; });
       return true;
@@ -391,7 +385,7 @@ ProjectionReport PrimalDual::step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eige
     own += s.mass[k] * (x - start - dt * v).segment<3>(3 * k).squaredNorm();  // -dt^2/2 of the acceleration
     size += s.mass[k] * start.segment<3>(3 * k).squaredNorm();
   }
-  s.reference = std::max(2 / (dt * dt) * std::sqrt(own), s.weighted_norm(s.held));
+  s.reference = std::max(2 / (dt * dt) * std::sqrt(own), force_norm(s.held, s.mass));
   s.rounding = place_rounding * std::sqrt(size) / tau2;
   for (int k = 0; k < s.mass.size(); ++k) s.held.segment<3>(3 * k) *= tau2 / s.mass[k];
   s.half_memory = s.memory;

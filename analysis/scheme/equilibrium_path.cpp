@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "analysis/constraint/composed_rows.h"
+#include "analysis/projection/force_norm.h"
 #include "analysis/projection/row_matrix.h"
 #include "analysis/scheme/node_forces.h"
 #include "geometry/clock.h"
@@ -50,6 +52,8 @@ struct EquilibriumPath::Impl {
   Vector x;
   Eigen::Matrix3Xd mu;
   double factor = 0, left = 0, remaining = 0;
+  double length = 0;   // that it tried
+  bool stuck = false;  // where it began: no length helps
   int iterations = 0, negative = 0;
 
   Impl(const MechanicalSystem& s, const PathOptions& o)
@@ -78,11 +82,6 @@ struct EquilibriumPath::Impl {
   }
   int places() const { return static_cast<int>(rows.place.size()); }
 
-  double weighted(const Vector& f) const {
-    double sum = 0;
-    for (int k = 0; k < system.node_mass.size(); ++k) sum += f.segment<3>(3 * k).squaredNorm() / system.node_mass[k];
-    return std::sqrt(sum);
-  }
   // Root of the mean product of two moves, by mass.
   double product(const Vector& a, const Vector& b) const {
     double sum = 0;
@@ -95,14 +94,15 @@ struct EquilibriumPath::Impl {
   void measure(double t);
   std::optional<int> factorise();
   void solve(bool with_gaps, Vector& out);
-  bool attempt(const DynamicState& state, double t, const PathPoint& point, double length, bool by_load,
+  bool attempt(const DynamicState& state, double t, PathPoint& point, double at_most, bool by_load,
                std::string& trouble);
+  std::string unbalanced() const;
   void finish(DynamicState& state, double dt, const PathPoint& point, StepWork& work, StepReport& report);
 };
 
 void EquilibriumPath::Impl::begin(const DynamicState& state, double t) {
   system.map->reduce(system.loads.force, loads, system.workers);
-  loads_size = weighted(loads);
+  loads_size = force_norm(loads, system.node_mass);
   forces.at(t, state.x, 1);
   const BlockMatrix& hessian = forces.hessian(state.x, true);
   const Vector none = Vector::Zero(system.node_mass.size());
@@ -121,7 +121,7 @@ void EquilibriumPath::Impl::measure(double t) {
   matrix.spread(mu, force);
   evaluate(composed, x, forces.fixed_places(), y);
   for (int p = 0; p < places(); ++p) gap.col(p) = (y.col(p) - rows.place[p].target(t)).cwiseProduct(rows.place[p].axes);
-  left = weighted(force) / loads_size;
+  left = force_norm(force, system.node_mass) / loads_size;
 }
 
 std::optional<int> EquilibriumPath::Impl::factorise() {
@@ -137,29 +137,39 @@ void EquilibriumPath::Impl::solve(bool with_gaps, Vector& out) {
   matrix.solve(rhs, out);
 }
 
-// Newton's method from the state to the next equilibrium: with `by_load` at the factor point.factor + length, else
-// where the path has gone on by `length`, along the tangent first and then normal to the move so far.
-bool EquilibriumPath::Impl::attempt(const DynamicState& state, double t, const PathPoint& point, double length,
-                                    bool by_load, std::string& trouble) {
+std::string EquilibriumPath::Impl::unbalanced() const {
+  return "Newton's method finds no balance in " + std::to_string(iterations) + " iterations (" + text_of(left) +
+         " of the loads is left)";
+}
+
+// Newton's method from the state to the next equilibrium: with `by_load` at the factor point.factor + at_most, else
+// where the path has gone on by `at_most`, or by what a load step allows: along the tangent first and then normal to
+// the move so far.
+bool EquilibriumPath::Impl::attempt(const DynamicState& state, double t, PathPoint& point, double at_most, bool by_load,
+                                    std::string& trouble) {
   x = state.x;
   mu = state.constraint.place;
   if (mu.cols() != places()) mu.setZero(3, places());
-  factor = by_load ? point.factor + length : point.factor;
-  iterations = 0;
-  for (;; ++iterations) {
+  factor = by_load ? point.factor + at_most : point.factor;
+  length = at_most;
+  remaining = std::numeric_limits<double>::infinity();
+  for (iterations = 0;; ++iterations, ++point.iterations) {
     measure(t);
     const bool held = places() == 0 || gap.colwise().norm().maxCoeff() <= place_tolerance;
     const bool balanced = left <= options.residual || remaining <= rounding * x.lpNorm<Eigen::Infinity>();
-    if (iterations > 0 && held && balanced) return true;
-    trouble = "Newton's method finds no balance in " + std::to_string(iterations) + " iterations (" + text_of(left) +
-              " of the loads is left)";
-    if (!std::isfinite(left) || iterations == options.max_iterations) return false;
+    const bool found = iterations > 0 && held && balanced;
+    if (!found && (!std::isfinite(left) || iterations == options.max_iterations)) {
+      trouble = unbalanced();
+      return false;
+    }
     const std::optional<int> below = factorise();
     if (!below) {
+      stuck = iterations == 0;
       trouble = "the stiffness is singular";
       return false;
     }
     negative = *below;
+    if (found) return true;
     rhs = -force;
     solve(true, move);
     if (!by_load) {
@@ -169,7 +179,8 @@ bool EquilibriumPath::Impl::attempt(const DynamicState& state, double t, const P
       if (iterations == 0) {
         const double size = std::sqrt(product(along, along));
         const bool back = point.moved.size() > 0 && product(point.moved, along) < 0;
-        share = (back ? -1 : 1) * std::min(length / size, 1.0 / options.load_steps);
+        length = std::min(at_most, size / options.load_steps);
+        share = (back ? -1 : 1) * length / size;
       } else {
         const Vector so_far = x - state.x;
         share = -product(so_far, move) / product(so_far, along);
@@ -200,25 +211,25 @@ PathReport EquilibriumPath::step(DynamicState& state, double dt, PathPoint& poin
   const double next = std::min(1.0, whole * (std::floor(point.factor / whole + 1e-9) + 1)) - point.factor;
   const bool arc = s.options.arc_length && point.length > 0;
   if (point.length == 0) point.length = whole, point.shortest = std::ldexp(whole, -halvings_at_most);
-  bool found = false;
-  while (true) {
-    s.remaining = std::numeric_limits<double>::infinity();
+  bool found = false, landed = false;
+  s.stuck = false;
+  for (;; ++point.halvings) {
     found = s.attempt(state, t, point, arc ? point.length : std::min(point.length, next), !arc, out.trouble);
-    point.iterations += s.iterations;
-    // Past the end: back to it, from where the path was last.
+    const double tried = s.length;
+    // Past the end: back to it, from where the path was last. Where that finds nothing, a shorter step may end before.
     if (found && arc && s.factor >= 1) {
-      s.remaining = std::numeric_limits<double>::infinity();
-      found = s.attempt(state, t, point, 1 - point.factor, true, out.trouble);
-      point.iterations += s.iterations;
+      found = !landed && s.attempt(state, t, point, 1 - point.factor, true, out.trouble);
+      landed = true;
     }
-    if (found || point.length / 2 < point.shortest) break;
-    point.length /= 2;
-    ++point.halvings;
+    if (found) break;
+    s.length = tried;
+    if (s.stuck || tried / 2 < point.shortest) break;
+    point.length = tried / 2;
   }
   out.step.projection.iterations = s.iterations;
   out.step.projection.converged = found;
   if (!found) {
-    out.trouble = "beyond " + text_of(point.factor) + " of the loads, with steps down to " + text_of(point.length) +
+    out.trouble = "beyond " + text_of(point.factor) + " of the loads, with steps down to " + text_of(s.length) +
                   (arc ? " m of the path: " : " of them: ") + out.trouble;
     return out;
   }
@@ -246,14 +257,9 @@ void EquilibriumPath::Impl::finish(DynamicState& state, double dt, const PathPoi
   next.v = Vector::Zero(x.size());
   next.constraint = state.constraint;
   next.constraint.place = mu;
-  next.q.resize(3 * system.map->control_points());
-  next.f.resize(next.q.size());
   report.dt = dt;
   report.at_end = true;
-  report.elastic = forces.force(x, next.q, next.f);
-  next.a.resize(x.size());
-  system.map->reduce(next.f, next.a, system.workers);
-  for (int k = 0; k < system.node_mass.size(); ++k) next.a.segment<3>(3 * k) /= system.node_mass[k];
+  report.elastic = initialise(system, next, factor);
   report.load_work = 0.5 * (point.factor + factor) * system.loads.force.dot(next.q - state.q);
   if (system.projection) {
     ProjectionMemory memory = no_impulses(rows);

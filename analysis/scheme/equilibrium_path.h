@@ -27,7 +27,7 @@ struct PathPoint {
   double shortest = 0;    // below it a step is given up
   Eigen::VectorXd moved;  // of the last step
   int steps = 0, halvings = 0, iterations = 0;
-  int negative = 0;  // eigenvalues of the stiffness that are below 0: the equilibrium is not stable
+  int negative = 0;  // eigenvalues of this state's stiffness that are below 0: the equilibrium is not stable
   double remaining = std::numeric_limits<double>::infinity();  // m, that the last iteration moved a node
 };
 void fields(auto& archive, Like<PathPoint> auto& p) {
@@ -40,10 +40,13 @@ struct PathReport {
 };
 
 // Newton's method with the exact tangent, which need not be positive; place rows are held by multipliers.
-//   (1) an accepted state is in equilibrium with `factor` of the loads, to the residual;
-//   (2) a step without balance is halved, ten times at most;
-//   (3) steps of the load land on each multiple of 1 / load_steps; both kinds end at a factor of 1;
-//   (4) the same bits for any number of threads.
+//   (1) an accepted state is in equilibrium with `factor` of the loads, to the residual, and `negative` is of its own
+//       stiffness;
+//   (2) a step without balance is tried again from where it began with half of what it tried, which may be less than it
+//       was allowed: no attempt is made twice, and none where the stiffness is singular from the start;
+//   (3) nothing shorter is tried than 1/1024 of a step of the load, or of the first step of the path;
+//   (4) steps of the load land on each multiple of 1 / load_steps; both kinds end at a factor of 1;
+//   (5) the same bits for any number of threads.
 class EquilibriumPath {
  public:
   // Throws SolverError where the system has strain rows or drag, or nodes without mass. The system must outlive it.

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/projection/force_norm.h"
 #include "analysis/projection/primal_dual.h"
 #include "analysis/scheme/node_forces.h"
 #include "geometry/clock.h"
@@ -134,10 +135,7 @@ DynamicState& ImplicitScheme::begin(const DynamicState& state, double dt, StepWo
   s.impulses = no_impulses(s.newton.rows());
   Vector loads(3 * s.system.map->nodes());
   s.system.map->reduce(s.system.loads.force, loads, s.system.workers);
-  double size = 0;
-  for (int k = 0; k < s.system.node_mass.size(); ++k)
-    size += loads.segment<3>(3 * k).squaredNorm() / s.system.node_mass[k];
-  s.reference = std::sqrt(size);
+  s.reference = force_norm(loads, s.system.node_mass);
   return next;
 }
 
@@ -152,13 +150,7 @@ StepReport ImplicitScheme::finish(DynamicState& state, double dt, StepWork& work
   report.limit_energy = found.energy;
   next.constraint = s.forces;
   if (system.projection) system.projection->restore(s.impulses);
-  next.q.resize(3 * system.map->control_points());
-  next.f.resize(next.q.size());
-  s.smooth.at(next.t, next.x, 1);
-  report.elastic = s.smooth.force(next.x, next.q, next.f);
-  // The cloth's own acceleration, for whoever goes on from here.
-  next.a.resize(next.x.size());
-  system.map->reduce(next.f, next.a, system.workers);
+  report.elastic = initialise(system, next);
   bool finite = true;
   for (int k = 0; k < system.node_mass.size(); ++k) {
     const Eigen::Vector3d v = next.v.segment<3>(3 * k), move = next.x.segment<3>(3 * k) - state.x.segment<3>(3 * k);
@@ -168,8 +160,6 @@ StepReport ImplicitScheme::finish(DynamicState& state, double dt, StepWork& work
     // Mean of the ends, as the work of a force that changes evenly.
     const Eigen::Vector3d mean = 0.5 * (v + state.v.segment<3>(3 * k));
     report.drag_work -= system.node_drag[k] * (mean - system.loads.wind).dot(move);
-    next.a.segment<3>(3 * k) -= system.node_drag[k] * (v - system.loads.wind);
-    next.a.segment<3>(3 * k) /= mass;
     finite = finite && next.x.segment<3>(3 * k).allFinite() && v.allFinite();
   }
   report.load_work = system.loads.force.dot(next.q - state.q);

@@ -36,22 +36,22 @@ void NodeForces::at(double t, const Vector& from, double beta) {
   beta_ = beta;
 }
 
-Elastic NodeForces::force(const Places& x, Vector& q, Vector& f) {
-  system_.map->expand(x, fixed_places_, q, system_.workers);
-  const Elastic elastic = internal_force(system_.potentials, q, f, system_.workers);
-  f += load_factor * system_.loads.force;
+Elastic NodeForces::force(const Places& x) {
+  system_.map->expand(x, fixed_places_, q_, system_.workers);
+  const Elastic elastic = internal_force(system_.potentials, q_, f_, system_.workers);
+  f_ += load_factor * system_.loads.force;
   return elastic;
 }
 
 double NodeForces::value(const Places& x) {
-  double sum = force(x, q_, f_).total() - load_factor * system_.loads.force.dot(q_);
+  double sum = force(x).total() - load_factor * system_.loads.force.dot(q_);
   for (int k = 0; k < system_.map->nodes(); ++k)
     sum += 0.5 * system_.node_drag[k] * beta_ * (velocity(x, k) - system_.loads.wind).squaredNorm();
   return sum;
 }
 
 void NodeForces::add_gradient(const Places& x, Vector& g) {
-  force(x, q_, f_);
+  force(x);
   system_.map->reduce(f_, of_nodes_, system_.workers);
   g -= of_nodes_;
   for (int k = 0; k < system_.map->nodes(); ++k)

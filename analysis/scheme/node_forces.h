@@ -20,8 +20,6 @@ class NodeForces final : public SmoothEnergy {
   double load_factor = 1;
   // Drag sees the velocity (x - from) / beta.
   void at(double t, const Eigen::VectorXd& from, double beta);
-  // Control points, forces on them without drag, and what the potentials store.
-  Elastic force(const Eigen::Ref<const Eigen::VectorXd>& x, Eigen::VectorXd& q, Eigen::VectorXd& f);
   const Eigen::Matrix3Xd& fixed_places() const { return fixed_places_; }
 
   double value(const Eigen::Ref<const Eigen::VectorXd>& x) override;
@@ -29,6 +27,8 @@ class NodeForces final : public SmoothEnergy {
   const BlockMatrix& hessian(const Eigen::Ref<const Eigen::VectorXd>& x, bool positive) override;
 
  private:
+  // Control points and forces on them without drag, in q_ and f_, and what the potentials store.
+  Elastic force(const Eigen::Ref<const Eigen::VectorXd>& x);
   Eigen::Vector3d velocity(const Eigen::Ref<const Eigen::VectorXd>& x, int k) const {
     return (x.segment<3>(3 * k) - from_.segment<3>(3 * k)) / beta_;
   }

@@ -14,10 +14,10 @@ namespace {
 using Vector = Eigen::VectorXd;
 
 // f_int + f_ext on the body's points.
-Elastic total_force(const MechanicalSystem& system, const Vector& q, Vector& f) {
+Elastic total_force(const MechanicalSystem& system, double load_factor, const Vector& q, Vector& f) {
   f.resize(q.size());
   const Elastic elastic = internal_force(system.potentials, q, f, system.workers);
-  f += system.loads.force;
+  f += load_factor * system.loads.force;
   return elastic;
 }
 
@@ -88,11 +88,12 @@ double motion_work(const MechanicalSystem& system, const DynamicState& from, con
   return sum;
 }
 
-void initialise(const MechanicalSystem& system, DynamicState& state) {
+Elastic initialise(const MechanicalSystem& system, DynamicState& state, double load_factor) {
   state.q.resize(3 * system.map->control_points());
-  system.map->expand(state.x, state.t, state.q);
-  total_force(system, state.q, state.f);
+  system.map->expand(state.x, system.map->fixed_places(state.t), state.q, system.workers);
+  const Elastic elastic = total_force(system, load_factor, state.q, state.f);
   acceleration(system, state.f, state.v, Vector::Zero(state.v.size()), 0, 0, state.a);
+  return elastic;
 }
 
 StepReport step(const MechanicalSystem& system, DynamicState& state, double dt) {
@@ -135,7 +136,7 @@ StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, 
   system.map->fixed_places(next.t, work.fixed_places);
   system.map->expand(next.x, work.fixed_places, next.q, system.workers);
   const Clock::time_point start = Clock::now();
-  report.elastic = total_force(system, next.q, next.f);
+  report.elastic = total_force(system, 1, next.q, next.f);
   report.force_seconds = since(start);
   acceleration(system, next.f, next.v, work.constraint, end_velocity ? 0 : 0.5 * dt, 0.5 * dt, next.a);
 

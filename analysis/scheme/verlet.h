@@ -63,8 +63,9 @@ struct MechanicalSystem {
   Workers* workers = nullptr;              // null: the caller's thread alone
 };
 
-// Accelerations, control points and forces from places and velocities: for the start and after a change of the system.
-void initialise(const MechanicalSystem& system, DynamicState& state);
+// Accelerations, control points and forces from places and velocities, and what the cloth stores: for the start, after
+// a change of the system, and for schemes that find places and velocities alone. `load_factor`: of the dead loads.
+Elastic initialise(const MechanicalSystem& system, DynamicState& state, double load_factor = 1);
 
 // Advances state by dt. The velocity between the steps is (x_n+1 - x_n) / dt after projection; drag is implicit.
 //   x~ = x + dt v + dt^2/2 a, projected at t + dt;  v_half = (x_n+1 - x_n) / dt

@@ -11,8 +11,11 @@
 #include <numbers>
 #include <vector>
 
+#include "analysis/constraint/composed_rows.h"
 #include "analysis/linear/indefinite_factor.h"
 #include "analysis/obstacle_course.h"
+#include "analysis/projection/row_matrix.h"
+#include "analysis/scheme/node_forces.h"
 #include "geometry/error.h"
 #include "support/near.h"
 
@@ -189,6 +192,34 @@ TEST(EquilibriumPath, HingedRoofsCarryTheirLimitLoads) {
   }
 }
 
+// Of the stiffness at the state, springs in place of the pins.
+int negative_eigenvalues(const ShellProblem& problem) {
+  const MechanicalSystem& system = problem.system();
+  const ConstraintRows& rows = system.projection->rows();
+  const ComposedRows composed = compose(*system.map, rows);
+  NodeForces forces(system);
+  forces.at(problem.state.t, problem.state.x, 1);
+  RowMatrix matrix(composed.free, system.node_mass, &forces.pattern());
+  matrix.scale = 0;
+  for (std::size_t p = 0; p < rows.place.size(); ++p) {
+    const Eigen::Vector3d stiff = 1e12 * rows.place[p].axes;
+    matrix.blocks[p] = {stiff.x(), stiff.y(), stiff.z()};
+  }
+  return matrix.factorise_any(&forces.hessian(problem.state.x, false)).value();
+}
+
+// So large a residual that a step's end lies apart from where its last matrix was made.
+TEST(EquilibriumPath, NegativeEigenvaluesAreThoseOfTheAcceptedState) {
+  ShellProblem problem = hinged_roof(12.7, 4);
+  int changes = 0, last = 0;
+  follow(problem, {.load_steps = 40, .arc_length = true, .residual = 0.1}, [&](const PathPoint& point) {
+    EXPECT_EQ(point.negative, negative_eigenvalues(problem)) << point.steps;
+    changes += point.negative != last ? 1 : 0;
+    last = point.negative;
+  });
+  EXPECT_EQ(changes, 2);  // beyond the limit load, and beyond the least load
+}
+
 TEST(EquilibriumPath, IndefiniteFactorSolvesAndCountsNegativeEigenvalues) {
   Eigen::Matrix3d a;
   a << 2, 1, 0, 1, -3, 1, 0, 1, 1;
@@ -208,6 +239,33 @@ TEST(EquilibriumPath, StepsWithoutBalanceAreHalvedAndLeadToTheSameEnd) {
   const PathPoint end = follow(coarse, {.load_steps = 1, .max_iterations = 6}, on);
   EXPECT_GT(end.halvings, 0);
   EXPECT_LT((fine.moved(1, 0.5) - coarse.moved(1, 0.5)).norm(), 1e-6);
+}
+
+// No length is tried twice: halved is what was tried, not what might have been.
+TEST(EquilibriumPath, HalvesWhatItTried) {
+  ShellProblem problem = cantilever(6);
+  problem.finish();
+  StepWork work;
+  // A tenth of the load is left: 0.1, 0.05, ... 0.0016.
+  EquilibriumPath by_load(problem.system(), {.load_steps = 1, .max_iterations = 1});
+  PathPoint point;
+  point.factor = 0.9;
+  point.length = 1;
+  point.shortest = 1.0 / 1024;
+  EXPECT_NE(by_load.step(problem.state, 1, point, work).trouble, "");
+  EXPECT_EQ(point.halvings, 6);
+  EXPECT_EQ(point.iterations, 7);
+  // A step of the path takes a tenth of the load at most, however long it might be.
+  EquilibriumPath by_length(problem.system(), {.load_steps = 10, .arc_length = true, .max_iterations = 1});
+  PathPoint along;
+  along.length = 10;
+  along.shortest = 0.01;
+  PathPoint farther = along;
+  farther.length = 1e6;
+  EXPECT_NE(by_length.step(problem.state, 1, along, work).trouble, "");
+  EXPECT_NE(by_length.step(problem.state, 1, farther, work).trouble, "");
+  EXPECT_GT(along.halvings, 1);
+  EXPECT_EQ(along.halvings, farther.halvings);
 }
 
 TEST(EquilibriumPath, WhatCanNotGoOnSaysWhereAndLeavesTheState) {
