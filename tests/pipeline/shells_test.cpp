@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shell benchmarks as scenes: on nets that fit and on trimmed ones. The nets' own convergence is in
-// tests/analysis/obstacle_course_test.cpp.
+// Shell benchmarks as scenes: on nets that fit and on trimmed ones. The references, their sources and the nets' own
+// convergence are in tests/analysis/obstacle_course_test.cpp.
 #include <gtest/gtest.h>
 
 #include <string>

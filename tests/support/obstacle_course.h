@@ -17,6 +17,15 @@
 
 namespace toile::test {
 
+inline constexpr double right_angle = std::numbers::pi / 2, degree = std::numbers::pi / 180;
+
+// Isotropic, of 1 kg/m2: Pa, 1, m.
+inline Fabric shell(double youngs_modulus, double poissons_ratio, double thickness) {
+  Fabric fabric = isotropic(youngs_modulus, poissons_ratio, thickness);
+  fabric.density = 1;
+  return fabric;
+}
+
 // Rational quadratic arc about the origin from angle a, a turn of `angle` < pi: columns of (w cos, w sin, w).
 inline Eigen::Matrix3d arc(double radius, double a, double angle) {
   const double w = std::cos(angle / 2), b = a + angle / 2;
