@@ -7,6 +7,7 @@
 #include <string>
 
 #include "geometry/error.h"
+#include "geometry/text.h"
 
 namespace toile {
 namespace {
@@ -87,8 +88,8 @@ std::vector<StrainRow> springs(const Body& body, int index, const TrimTopology& 
     const Eigen::Vector3d along = apply(sum.over(1), body.rest());
     const double length = along.norm();
     if (!(length > 0))
-      throw GeometryError("panel '" + panel.name + "': a spring between (u, v) = (" + std::to_string(mesh.u[ai]) +
-                          ", " + std::to_string(mesh.v[aj]) + ") and the next knot vertex has no length");
+      throw GeometryError("panel '" + panel.name + "': a spring between (u, v) = (" + text(mesh.u[ai]) + ", " +
+                          text(mesh.v[aj]) + ") and the next knot vertex has no length");
     const Eigen::Vector2d middle(0.5 * (mesh.u[ai] + mesh.u[bi]), 0.5 * (mesh.v[aj] + mesh.v[bj]));
     const MaterialPoint frame = body.material_point(index, middle.x(), middle.y());
     Eigen::Vector2d thread;

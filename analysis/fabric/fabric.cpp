@@ -6,6 +6,7 @@
 
 #include "analysis/fabric/bending_law.h"
 #include "geometry/error.h"
+#include "geometry/text.h"
 
 namespace toile {
 
@@ -32,7 +33,7 @@ Fabric isotropic(double youngs_modulus, double poissons_ratio, double thickness)
 void validate(const Fabric& fabric) {
   const auto check = [](const char* name, double value, bool positive) {
     if (std::isfinite(value) && (positive ? value > 0 : value >= 0)) return;
-    throw Error(std::string("fabric: ") + name + " is " + std::to_string(value) + ", must be " +
+    throw Error(std::string("fabric: ") + name + " is " + text(value) + ", must be " +
                 (positive ? "positive" : "zero or positive"));
   };
   check("density", fabric.density, true);
@@ -44,8 +45,8 @@ void validate(const Fabric& fabric) {
   // More would make some stretch or bend give energy.
   const auto check_coupling = [](const char* name, double value, double most) {
     if (std::abs(value) <= most) return;  // so is nothing that is no number
-    throw Error(std::string("fabric: ") + name + " is " + std::to_string(value) + ", must lie between -" +
-                std::to_string(most) + " and " + std::to_string(most));
+    throw Error(std::string("fabric: ") + name + " is " + text(value) + ", must lie between -" + text(most) + " and " +
+                text(most));
   };
   check_coupling("membrane.coupling", fabric.membrane.coupling, std::sqrt(fabric.membrane.weft * fabric.membrane.warp));
   check_coupling("bending.coupling", fabric.bending.coupling, fabric.bending.b0);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "geometry/error.h"
+#include "geometry/text.h"
 
 namespace toile {
 namespace {
@@ -67,7 +68,7 @@ TimeStepBound time_step_bound(const Model& model, const AffineMap& map, const Ei
   for (int k = 0; k < nodes; ++k)
     if (!(node_mass[k] > 0))
       throw SolverError("no time step: control point " + std::to_string(map.node_control_point()[k]) + " has mass " +
-                        std::to_string(node_mass[k]) + " kg");
+                        text(node_mass[k]) + " kg");
   const Eigen::VectorXd scale = node_mass.cwiseSqrt().cwiseInverse().replicate(1, 3).transpose().reshaped();
 
   const std::vector<const Potential*> potentials = model.potentials();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "geometry/error.h"
+#include "geometry/text.h"
 
 namespace toile {
 
@@ -28,8 +29,8 @@ void evaluate_material_basis(const ClothPanel& panel, int span_u, int span_v, do
   const Eigen::Vector3d normal = A1.cross(A2);
   out.jacobian = normal.norm();
   if (!(out.jacobian > 1e-12 * A1.norm() * A2.norm()) || !std::isfinite(out.jacobian))
-    throw GeometryError("panel " + panel.name + ": the surface has no tangent plane at u = " + std::to_string(u) +
-                        ", v = " + std::to_string(v));
+    throw GeometryError("panel " + panel.name + ": the surface has no tangent plane at u = " + text(u) +
+                        ", v = " + text(v));
 
   const Eigen::Vector3d a3 = normal / out.jacobian;
   const Eigen::Vector3d u_direction = panel.straight_u ? *panel.straight_u - panel.straight_u->dot(a3) * a3 : A1;

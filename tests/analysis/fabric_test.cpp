@@ -108,6 +108,11 @@ TEST(Fabric, ImpossibleNumbersAreNamed) {
   EXPECT_NE(message([](Fabric& f) { f.density = 0; }).find("density"), std::string::npos);
   EXPECT_NE(message([](Fabric& f) { f.membrane.shear = -1; }).find("membrane.shear"), std::string::npos);
   EXPECT_NE(message([](Fabric& f) { f.bending.kappa_reg = 0; }).find("kappa_reg"), std::string::npos);
+  EXPECT_NE(message([](Fabric& f) { f.membrane.weft = -2.5e-9; }).find("is -2.5e-09,"), std::string::npos);
+  EXPECT_NE(message([](Fabric& f) {
+              f.bending.b0 = 1e-9, f.bending.coupling = 2e-9;
+            }).find("is 2e-09, must lie between -1e-09 and 1e-09"),
+            std::string::npos);
   EXPECT_NE(message([](Fabric& f) { f.drag = std::nan(""); }).find("drag"), std::string::npos);
   EXPECT_EQ(message([](Fabric& f) { f.bending = {.b0 = 0, .kappa0 = 0, .kappa_reg = 0, .twist = 0}; }), "");
 }
