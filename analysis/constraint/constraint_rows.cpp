@@ -32,11 +32,10 @@ ScalarRow make_row(const MaterialPoint& point, int which) {
 
 }  // namespace
 
-void require_whole_places(const ConstraintRows& rows) {
+void require_whole_places(const ConstraintRows& rows, const std::string& remedy) {
   for (const PlaceRow& row : rows.place)
     if (row.axes != Eigen::Vector3d::Ones())
-      throw SolverError("pin " + std::to_string(row.pin) +
-                        " holds some components only (hold), which only the default solver of the strain limit does");
+      throw SolverError("pin " + std::to_string(row.pin) + " holds some components only (hold): " + remedy);
 }
 
 std::vector<StrainRow> strain_rows(const Body& body, const AffineMap& map,

@@ -38,8 +38,10 @@ struct ConstraintRows {
   std::vector<PlaceRow> place;
 };
 
-// For solvers that hold all components of a place row or none. Throws SolverError where one holds some.
-void require_whole_places(const ConstraintRows& rows);
+// For what can hold all components of a place row only. Throws SolverError where a row holds some: "pin N holds some
+// components only (hold): `remedy`".
+void require_whole_places(const ConstraintRows& rows,
+                          const std::string& remedy = "only the default solver of the strain limit keeps such a pin");
 
 // Weft and warp row of every point that is used, in the order of the points; `points[panel]` as constraint_points()
 // gives them. Functions that vanish at a point (all but p per direction on a C1 knot line) are left out. Rows are hard;

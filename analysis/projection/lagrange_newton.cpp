@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <utility>
 
 #include "analysis/constraint/composed_rows.h"
+#include "analysis/projection/force_norm.h"
 #include "analysis/projection/row_matrix.h"
 #include "geometry/clock.h"
 #include "geometry/error.h"
@@ -115,18 +115,13 @@ void LagrangeNewton::Impl::measure(const Eigen::Ref<const Eigen::VectorXd>& x, P
 void LagrangeNewton::Impl::balance(const Eigen::Ref<const Eigen::VectorXd>& x, ProjectionReport& report) {
   missed = strain - softness.head(strains()).cwiseProduct(lambda() - anchor);
   for (int k = 0; k < mass.size(); ++k) force.segment<3>(3 * k) = mass[k] * (x - candidate).segment<3>(3 * k);
-  const auto size_of_force = [&] {
-    double sum = 0;
-    for (int k = 0; k < mass.size(); ++k) sum += force.segment<3>(3 * k).squaredNorm() / mass[k];
-    return std::sqrt(sum);
-  };
-  const double moved = size_of_force();
+  const double moved = force_norm(force, mass);
   double smallest_move = 0;
   for (int k = 0; k < mass.size(); ++k) smallest_move += mass[k] * x.segment<3>(3 * k).squaredNorm();
   smallest_move = rounding * std::sqrt(smallest_move);
   for (int r = 0; r < strains(); ++r) spread(r, lambda()[r] * y.col(r), force);
   for (int p = 0; p < places(); ++p) spread(strains() + p, memory.place_multipliers.col(p), force);
-  const double left = size_of_force();
+  const double left = force_norm(force, mass);
   report.residual = left <= smallest_move ? 0 : left / std::max(moved, smallest_move);
   const double first = std::max(first_strain, least_strain * options.tolerance);
   if (strains() > 0) report.residual = std::max(report.residual, missed.cwiseAbs().maxCoeff() / first);

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <string>
 #include <utility>
 
 #include "analysis/constraint/composed_rows.h"
@@ -547,6 +545,10 @@ PrimalDual::~PrimalDual() = default;
 
 ProjectionReport PrimalDual::project(Eigen::Ref<Eigen::VectorXd> x, double t) {
   Impl& s = *impl_;
+  require_whole_places(
+      s.rows,
+      "steps keep such a pin, but cloth that starts beyond its strain limit, or away from a pin, can't "
+      "be moved there; let it start within the limit and with each pin where it holds, or hold xyz");
   if (!s.projection) {
     s.projection = std::make_unique<FastProjection>(
         s.map, s.mass, s.rows,

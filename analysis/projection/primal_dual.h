@@ -56,7 +56,8 @@ class PrimalDual final : public ConstraintSolver {
              const PrimalDualOptions& options = {}, const BlockPattern* added = nullptr);
   ~PrimalDual() override;
 
-  ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) override;  // FastProjection's
+  // FastProjection's: throws SolverError where a place row holds some components only.
+  ProjectionReport project(Eigen::Ref<Eigen::VectorXd> x, double t) override;
   ProjectionReport step(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,
                         const Eigen::Ref<const Eigen::VectorXd>& start, double dt, ConstraintForces& forces) override;
   ProjectionReport again(Eigen::Ref<Eigen::VectorXd> x, Eigen::Ref<Eigen::VectorXd> v, double t,

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 #include <utility>
-#include <vector>
 
 #include "analysis/projection/force_norm.h"
 #include "analysis/projection/primal_dual.h"
@@ -51,7 +50,7 @@ struct ImplicitScheme::Impl {
   ProjectionReport minimise(Vector& x, const Vector& guess, const Vector& from, double beta, double t, double weight) {
     smooth.at(t, from, beta);
     const ProjectionReport report = newton.minimise(x, guess, beta, t, smooth, reference, forces);
-    const ProjectionMemory now = newton.memory();
+    const ProjectionMemory& now = newton.memory();
     impulses.strain_impulses += weight * now.strain_impulses;
     impulses.place_multipliers += weight * now.place_multipliers;
     impulses.strain_multipliers = now.strain_multipliers;

@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "analysis/flat_cloth.h"
 #include "analysis/projection/fast_projection.h"
@@ -140,6 +141,14 @@ TEST(PrimalDual, APlaceRowHoldsTheComponentsThatItNames) {
   EXPECT_THROW(FastProjection(free_map(c), c.mass, rows), SolverError);
   EXPECT_THROW(LagrangeNewton(free_map(c), c.mass, rows), SolverError);
   EXPECT_THROW(Substeps(free_map(c), c.mass, rows), SolverError);
+  // Steps are taken; what can't be done is said, and what to do.
+  try {
+    solver.project(motion.x, 0);
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const SolverError& error) {
+    for (const char* part : {"pin 0 holds some components", "steps keep such a pin", "start within the limit"})
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+  }
 }
 
 // Cloth that a step would compress by three times the limit buckles, where tensions and laws say nothing about which
