@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What stores energy in a state of the coordinates: the elastic laws of a model, later contact and seams.
+// What stores energy in a state of the coordinates: the elastic laws of a model, later seams.
 #pragma once
 
 #include <Eigen/Core>

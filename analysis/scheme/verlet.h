@@ -43,7 +43,7 @@ struct StepReport {
   bool at_end = false;      // a solver with end_velocity(): the law below holds at the end
   double load_work = 0;     // J, work of dead loads in the step
   double drag_work = 0;     // J, work of drag (negative: dissipated)
-  double motion_work = 0;   // J, work of moved pins, and of what tightens rows
+  double motion_work = 0;   // J, work of moved pins, of moving obstacles, and of what tightens rows
   bool finite = true;
   double force_seconds = 0, projection_seconds = 0;  // wall time
 };
@@ -87,7 +87,9 @@ struct StepWork {
 StepReport step(const MechanicalSystem& system, DynamicState& state, double dt, StepWork& work);
 StepReport step(const MechanicalSystem& system, DynamicState& state, double dt);
 
-// Work that moved pins do on the cloth between two states [J]: their force against what the cloth pulls, trapezoidal.
+// Work that moved pins do on the cloth between two states [J], trapezoidal: of fixed control points by the mean of what
+// the cloth pulls with at both states, of place rows by the force of the step between them. (Obstacles':
+// ProjectionReport::contact_work.)
 double motion_work(const MechanicalSystem& system, const DynamicState& from, const DynamicState& to, StepWork& work);
 
 // Force that each fixed control point and each place row exerts on the cloth [N] at the state's time, dt being the last

@@ -24,7 +24,7 @@ struct ShellEnergy {
 };
 
 //   (1) force = -dE/dq; (2) rigid motion of q leaves the energy; (3) results don't depend on the number of threads;
-//   (4) bending is not assembled where b0 = 0, membrane not where all k = 0.
+//   (4) bending is not assembled where b0 and twist are 0, membrane not where weft, warp and shear are 0.
 // Models of fewer than 8000 quadrature points stay on the caller's thread, which is faster; larger ones serve one
 // caller with threads at a time.
 class ShellModel final : public Model, public Potential {
