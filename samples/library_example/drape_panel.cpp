@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,9 +23,10 @@ int main(int argc, char** argv) try {
 
   const std::vector<std::string> pins(argv + 3, argv + argc);
   const toile::TrimmedSurface draped = toile::drape(panel, pins, {.span = 0.06});
-  double lowest = 0;  // of the material: control points without cloth may lie anywhere
-  for (const Eigen::Vector2d& uv : toile::quadrature(draped).points)
-    lowest = std::min(lowest, draped.surface(uv.x(), uv.y()).z());
+  // Points of the cloth and its border: control points lie off it, and where there is no cloth anywhere.
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const toile::ConstraintPoint& at : toile::constraint_points(draped))
+    lowest = std::min(lowest, draped.surface(at.u, at.v).z());
   std::printf("hangs down to z = %.3f m\n", file.metres_per_unit * lowest);
 
   const toile::OutputFace face{draped, panel.name + " draped", 0, std::nullopt};
