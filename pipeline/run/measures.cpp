@@ -96,7 +96,8 @@ void measure_limit(const ConstraintRows& rows, const Eigen::VectorXd& q, StateMe
 }
 
 // Energy of the fabric's weft and warp strain over the cloth less that of the strains that the rows see: what hourglass
-// modes hold. Negative where the rows count more than there is.
+// modes hold. Where weft and warp are coupled each row counts half of what both hold together, its own strain against
+// the other at its place. Negative where the rows count more than there is.
 double unseen_energy(const Build& build, const System& system, const Eigen::VectorXd& q) {
   const Model& model = *build.model;
   double energy = 0;
@@ -111,10 +112,11 @@ double unseen_energy(const Build& build, const System& system, const Eigen::Vect
   }
   for (const StrainRow& row : system.projection->rows().strain) {
     const Fabric& fabric = model.panels()[static_cast<std::size_t>(row.panel)].fabric;
-    const double c = 0.5 * (apply(row.row, q).squaredNorm() - 1);
-    const double along = row.warp ? membrane_stress(fabric.membrane, 0.0, c, 0.0).S22
-                                  : membrane_stress(fabric.membrane, c, 0.0, 0.0).S11;
-    energy -= 0.5 * along * row.area * c;
+    const double seen = 0.5 * (apply(row.row, q).squaredNorm() - 1);
+    const Eigen::Vector3d there = model.state(row.panel, row.uv.x(), row.uv.y(), q).strain;
+    const double along = row.warp ? membrane_stress(fabric.membrane, there[0], seen, 0.0).S22
+                                  : membrane_stress(fabric.membrane, seen, there[1], 0.0).S11;
+    energy -= 0.5 * along * row.area * seen;
   }
   return energy;
 }
