@@ -23,8 +23,8 @@ namespace toile {
 namespace {
 
 using test::cylinder_part;
-using test::degree;
 using test::flat_surface;
+using test::one_degree;
 using test::refined;
 using test::right_angle;
 using test::shell;
@@ -120,7 +120,7 @@ TEST(EquilibriumPath, SlitAnnularPlateUnderALineForce) {
 
 // The point that is pushed goes in by more than the one that is pulled goes out.
 TEST(EquilibriumPath, HemisphereWithAHoleUnderPointForces) {
-  ShellProblem problem(refined(sphere_part(10, 72 * degree), 3, 22, 22), shell(6.825e7, 0.3, 0.04));
+  ShellProblem problem(refined(sphere_part(10, 72 * one_degree), 3, 22, 22), shell(6.825e7, 0.3, 0.04));
   problem.mirror_edge(0, 0, 1);
   problem.mirror_edge(0, 1, 0);
   problem.hold(problem.edge(1, 1, 0), {0, 0, 1});

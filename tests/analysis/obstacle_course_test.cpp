@@ -14,7 +14,7 @@ namespace toile {
 namespace {
 
 using test::cylinder_part;
-using test::degree;
+using test::one_degree;
 using test::refined;
 using test::right_angle;
 using test::shell;
@@ -51,7 +51,7 @@ void solve(ShellProblem& problem) {
 // A quarter of the roof under its own weight, its ends on rigid diaphragms. [Scordelis & Lo 1964]
 double roof_edge(int p, int spans) {
   const double share = 1e-5;
-  ShellProblem problem(refined(cylinder_part(25, 40 * degree, 25), p, spans, spans), shell(4.32e8, 0, 0.25));
+  ShellProblem problem(refined(cylinder_part(25, 40 * one_degree, 25), p, spans, spans), shell(4.32e8, 0, 0.25));
   problem.mirror_edge(0, 0, 0);
   problem.mirror_edge(1, 0, 1);
   problem.hold_edge(1, 1, {1, 0, 1});
@@ -104,7 +104,7 @@ TEST(ObstacleCourse, PinchedHemisphere) {
 }
 
 TEST(ObstacleCourse, PinchedHemisphereWithAHole) {
-  expect_displacement(pinched_hemisphere(3, 17, 72 * degree), open_hemisphere, 1e-3);
+  expect_displacement(pinched_hemisphere(3, 17, 72 * one_degree), open_hemisphere, 1e-3);
 }
 
 // A pinned square plate whose middle sinks by half its thickness, so that it stretches: the figure of gsKLShell.
@@ -124,8 +124,8 @@ TEST(ObstacleCourse, PinnedPlateBendsAndStretches) {
 // a quarter of what it should. Degree 3 is much better there, and both converge.
 TEST(ObstacleCourse, MembraneLockingIsACoarseNetsAndFallsWithDegreeAndMesh) {
   const double exact = open_hemisphere.limit;
-  const double two = pinched_hemisphere(2, 8, 72 * degree), three = pinched_hemisphere(3, 8, 72 * degree),
-               fine = pinched_hemisphere(2, 32, 72 * degree);
+  const double two = pinched_hemisphere(2, 8, 72 * one_degree), three = pinched_hemisphere(3, 8, 72 * one_degree),
+               fine = pinched_hemisphere(2, 32, 72 * one_degree);
   EXPECT_LT(two, 0.35 * exact);
   EXPECT_GT(three, 0.95 * exact);
   EXPECT_GT(fine, 0.98 * exact);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "pipeline/panels.h"
 
@@ -20,9 +21,9 @@ TEST(Measures, AUniformStrainHidesNoEnergyWhateverTheFabric) {
   const Folder folder("unseen");
   test::write_panels(folder / "panel.igs", {test::sheet("cloth")});
   for (const char* law : {"", "law='isotropic',youngs_modulus=1e4,poissons_ratio=0.4,"}) {
-    const Build b = build(parse_scene(
-        test::scene_text(""), folder / "scene.toml",
-        {std::string("fabric.sheet={") + law + "thickness=0.001}", "panel.0.fabric=sheet", "pin=[{at='corner:0,0'}]"}));
+    const std::vector<std::string> settings = {std::string("fabric.sheet={") + law + "thickness=0.001}",
+                                               "panel.0.fabric=sheet", "pin=[{at='corner:0,0'}]"};
+    const Build b = build(parse_scene(test::scene_text(""), folder / "scene.toml", settings));
     const std::unique_ptr<System> system = assemble(b, 0);
     Eigen::VectorXd q = b.start;
     for (Eigen::Index k = 0; k < q.size(); k += 3) q[k] *= 1.006, q[k + 1] *= 1.004;

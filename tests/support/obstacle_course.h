@@ -17,7 +17,7 @@
 
 namespace toile::test {
 
-inline constexpr double right_angle = std::numbers::pi / 2, degree = std::numbers::pi / 180;
+inline constexpr double right_angle = std::numbers::pi / 2, one_degree = std::numbers::pi / 180;
 
 // Isotropic, of 1 kg/m2: Pa, 1, m.
 inline Fabric shell(double youngs_modulus, double poissons_ratio, double thickness) {
