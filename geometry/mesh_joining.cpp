@@ -3,8 +3,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <string>
 #include <utility>
 #include <vector>
+
+#include "geometry/finite.h"
 
 namespace toile {
 
@@ -101,6 +104,10 @@ void cut(const Cut& whole, std::vector<Triangle>& out) {
 }  // namespace
 
 TriangleMesh join_borders(TriangleMesh mesh, double gap) {
+  require_finite(gap, "the gap between borders");
+  for (const Triangle& t : mesh.triangles)
+    for (const int v : t)
+      require_finite(Vector3d(mesh.vertices.col(v)), ("vertex " + std::to_string(v) + " of the mesh").c_str());
   // Corners that are the same before those that are only near.
   merge_border_vertices(mesh, 1e-3 * gap);
   merge_border_vertices(mesh, 0.25 * gap);

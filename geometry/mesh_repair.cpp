@@ -178,7 +178,8 @@ void Repair::turn_minorities() {
   say(turned, "triangle", "turned that faced against the neighbours", first);
 }
 
-// A triangle with its corners on one line gives its long edge to the neighbour there: no gap opens.
+// A triangle with its corners on one line gives its long edge to the neighbour there: no gap opens. Where that leads to
+// others without end, they are taken out.
 void Repair::flip_flat() {
   const auto height = [&](const Triangle& t) {
     const Vector3d a = vertex(t[0]), b = vertex(t[1]), c = vertex(t[2]);
@@ -187,16 +188,24 @@ void Repair::flip_flat() {
   };
   std::size_t gone = 0;
   Vector3d first = Vector3d::Zero();
-  constexpr int most_passes = 10;
-  for (int pass = 0; pass <= most_passes; ++pass) {
+  constexpr int most_idle_passes = 10;  // that leave no fewer of them
+  std::size_t fewest = triangles().size() + 1;
+  for (int idle = 0;;) {
     std::vector<int> bad;
     for (int f = 0; f < static_cast<int>(triangles().size()); ++f)
       if (height(triangles()[f]) <= flat_share * size) bad.push_back(f);
     if (bad.empty()) break;
+    idle = bad.size() < fewest ? 0 : idle + 1;
+    fewest = std::min(fewest, bad.size());
     if (gone == 0) first = middle(triangles()[bad[0]]);
     const MeshTopology top = topology();
     std::vector<char> touched(triangles().size(), 0), dead(triangles().size(), 0);
     for (const int f : bad) {
+      if (idle == most_idle_passes) {
+        dead[f] = 1;
+        ++gone;
+        continue;
+      }
       if (touched[f]) continue;
       Triangle& t = triangles()[f];
       int k = 0;  // of the longest edge
@@ -212,7 +221,7 @@ void Repair::flip_flat() {
       if (g >= 0)
         for (const int v : triangles()[g])
           if (v != p && v != q) d = v;
-      if (d == c || pass == most_passes) {
+      if (d == c) {
         dead[f] = 1;
         continue;
       }

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/error.h"
 #include "geometry/mesh_repair.h"
+#include "support/bodies.h"
 
 namespace toile {
 namespace {
@@ -47,13 +49,6 @@ void add_disc(TriangleMesh& mesh, double z, int n, bool up) {
   mesh.vertices.col(first + n) << 0, 0, z;
 }
 
-double volume(const TriangleMesh& mesh) {
-  double sum = 0;
-  for (const Triangle& t : mesh.triangles)
-    sum += mesh.vertices.col(t[0]).dot(Vector3d(mesh.vertices.col(t[1])).cross(Vector3d(mesh.vertices.col(t[2])))) / 6;
-  return sum;
-}
-
 // Two half shells of two heights each, one patch that closes on itself, two lids: no two have the same points.
 TEST(MeshJoining, PatchesWithDifferentPointsAlongTheirEdgesBecomeAClosedBody) {
   constexpr double pi = std::numbers::pi;
@@ -67,7 +62,7 @@ TEST(MeshJoining, PatchesWithDifferentPointsAlongTheirEdgesBecomeAClosedBody) {
   const double sagitta = 1 - std::cos(pi / 71);  // 1 mm, of the coarsest
   const RepairedMesh body = repair_mesh(join_borders(patches, 2 * sagitta));
   EXPECT_TRUE(body.closed) << body.warnings[0];
-  EXPECT_NEAR(volume(body.mesh), 2 * pi, 2 * pi * 2 * sagitta);
+  EXPECT_NEAR(test::volume(body.mesh), 2 * pi, 2 * pi * 2 * sagitta);
   for (Eigen::Index k = 0; k < body.mesh.vertices.cols(); ++k)
     EXPECT_LT(std::abs(std::hypot(body.mesh.vertices(0, k), body.mesh.vertices(1, k)) - 1) *
                   body.mesh.vertices.col(k).head<2>().norm(),
@@ -81,6 +76,14 @@ TEST(MeshJoining, BordersFartherApartStayBorders) {
   const TriangleMesh joined = join_borders(two, 0.005);
   EXPECT_EQ(joined.triangles, two.triangles);
   EXPECT_EQ(repair_mesh(joined).mesh.vertices.cols(), two.vertices.cols());
+}
+
+TEST(MeshJoining, NumbersMustBeFinite) {
+  TriangleMesh two;
+  add_patch(two, 0, 1, 0, 1, 10, 1);
+  EXPECT_THROW(join_borders(two, std::nan("")), GeometryError);
+  two.vertices(1, 3) = std::nan("");
+  EXPECT_THROW(join_borders(two, 0.005), GeometryError);
 }
 
 }  // namespace

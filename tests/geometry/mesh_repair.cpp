@@ -17,13 +17,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-double volume(const TriangleMesh& mesh) {
-  double sum = 0;
-  for (const Triangle& t : mesh.triangles)
-    sum += mesh.vertices.col(t[0]).dot(Vector3d(mesh.vertices.col(t[1])).cross(Vector3d(mesh.vertices.col(t[2])))) / 6;
-  return sum;
-}
-
 TriangleMesh joined(const TriangleMesh& a, TriangleMesh b, const Vector3d& shift) {
   b.vertices.colwise() += shift;
   TriangleMesh out;
@@ -101,7 +94,7 @@ TEST(MeshRepair, LeavesASoundMeshAsItIs) {
     EXPECT_TRUE(result.closed);
     EXPECT_TRUE(result.repairs.empty()) << result.repairs[0];
     EXPECT_TRUE(result.warnings.empty()) << result.warnings[0];
-    EXPECT_DOUBLE_EQ(volume(result.mesh), volume(mesh));
+    EXPECT_DOUBLE_EQ(test::volume(result.mesh), test::volume(mesh));
     EXPECT_EQ(result.mesh.triangles.size(), mesh.triangles.size());
   }
 }
@@ -112,7 +105,7 @@ TEST(MeshRepair, JoinsTrianglesThatHaveTheirOwnVertices) {
   EXPECT_TRUE(result.closed);
   EXPECT_EQ(result.mesh.vertices.cols(), torus.vertices.cols());
   EXPECT_TRUE(says(result.repairs, "480 vertices merged"));
-  EXPECT_NEAR(volume(result.mesh), volume(torus), 1e-5);
+  EXPECT_NEAR(test::volume(result.mesh), test::volume(torus), 1e-5);
   // What is a hundredth of a per mille apart is apart.
   EXPECT_EQ(repaired(soup(torus, 1e-4)).mesh.vertices.cols(), 3 * 192);
 }
@@ -121,10 +114,10 @@ TEST(MeshRepair, TurnsMinoritiesAndBodiesThatAreInsideOut) {
   TriangleMesh some = test::spiky_mesh(10), all = some;
   for (const std::size_t f : {3, 4, 5, 77, 120}) turn(some, f);
   for (std::size_t f = 0; f < all.triangles.size(); ++f) turn(all, f);
-  const double right = volume(test::spiky_mesh(10));
-  EXPECT_NEAR(volume(repaired(some).mesh), right, 1e-12);
+  const double right = test::volume(test::spiky_mesh(10));
+  EXPECT_NEAR(test::volume(repaired(some).mesh), right, 1e-12);
   EXPECT_TRUE(says(repaired(some).repairs, "5 triangles turned"));
-  EXPECT_NEAR(volume(repaired(all).mesh), right, 1e-12);
+  EXPECT_NEAR(test::volume(repaired(all).mesh), right, 1e-12);
   EXPECT_TRUE(says(repaired(all).repairs, "1 closed surface was inside out"));
 }
 
@@ -132,14 +125,14 @@ TEST(MeshRepair, KeepsACavityThatTheFileHas) {
   TriangleMesh inner = test::sphere_mesh(8, 0.4);
   for (std::size_t f = 0; f < inner.triangles.size(); ++f) turn(inner, f);
   const TriangleMesh shell = joined(test::sphere_mesh(12, 1), inner, Vector3d::Zero());
-  EXPECT_NEAR(volume(repaired(shell).mesh), volume(shell), 1e-12);
+  EXPECT_NEAR(test::volume(repaired(shell).mesh), test::volume(shell), 1e-12);
   TriangleMesh inside_out = shell;
   for (std::size_t f = 0; f < inside_out.triangles.size(); ++f) turn(inside_out, f);
-  EXPECT_NEAR(volume(repaired(inside_out).mesh), volume(shell), 1e-12);
+  EXPECT_NEAR(test::volume(repaired(inside_out).mesh), test::volume(shell), 1e-12);
   // Beside each other both face outwards.
   const TriangleMesh beside = joined(test::sphere_mesh(12, 1), inner, Vector3d(3, 0, 0));
-  EXPECT_NEAR(volume(repaired(beside).mesh), volume(test::sphere_mesh(12, 1)) + volume(test::sphere_mesh(8, 0.4)),
-              1e-12);
+  EXPECT_NEAR(test::volume(repaired(beside).mesh),
+              test::volume(test::sphere_mesh(12, 1)) + test::volume(test::sphere_mesh(8, 0.4)), 1e-12);
 }
 
 TEST(MeshRepair, TakesOutWhatHasNoArea) {
@@ -166,12 +159,37 @@ TEST(MeshRepair, ATriangleOnOneLineOpensNoGap) {
   box.triangles.push_back({split[0], split[1], 8});
   const RepairedMesh result = repaired(box);
   EXPECT_TRUE(result.closed);
-  EXPECT_NEAR(volume(result.mesh), 8, 1e-14);
+  EXPECT_NEAR(test::volume(result.mesh), 8, 1e-14);
   EXPECT_TRUE(says(result.repairs, "1 triangle with all corners on one line joined"));
   for (const Triangle& t : result.mesh.triangles) {
     const Vector3d a = result.mesh.vertices.col(t[0]);
     EXPECT_GT(Vector3d(result.mesh.vertices.col(t[1]) - a).cross(Vector3d(result.mesh.vertices.col(t[2]) - a)).norm(),
               0.1);
+  }
+}
+
+// An edge of the box has 41 vertices on one side, and triangles without area fan out from one end of it.
+TEST(MeshRepair, ManyTrianglesOnOneLineOpenNoGap) {
+  constexpr int parts = 40;
+  TriangleMesh box = test::box_mesh({1, 1, 1});
+  const auto [a, b, c] = box.triangles[0];
+  box.vertices.conservativeResize(3, 8 + parts - 1);
+  std::vector<int> along{a};
+  for (int k = 1; k < parts; ++k) {
+    const double s = static_cast<double>(k) / parts;
+    box.vertices.col(7 + k) = (1 - s) * box.vertices.col(a) + s * box.vertices.col(b);
+    along.push_back(7 + k);
+  }
+  along.push_back(b);
+  box.triangles.erase(box.triangles.begin());
+  for (int k = 0; k < parts; ++k) box.triangles.push_back({along[k], along[k + 1], c});
+  for (int k = parts - 1; k > 0; --k) box.triangles.push_back({a, along[k + 1], along[k]});
+  const RepairedMesh result = repaired(box);
+  EXPECT_TRUE(result.closed);
+  EXPECT_NEAR(test::volume(result.mesh), 8, 1e-13);
+  for (const auto& [p, q, r] : result.mesh.triangles) {
+    const Vector3d x = result.mesh.vertices.col(p), y = result.mesh.vertices.col(q), z = result.mesh.vertices.col(r);
+    EXPECT_GT((y - x).cross(z - x).norm(), 1e-3);
   }
 }
 
@@ -182,7 +200,7 @@ TEST(MeshRepair, TakesApartWhatMerelyTouches) {
     const RepairedMesh result = repaired(two);
     EXPECT_TRUE(result.closed);
     EXPECT_EQ(result.mesh.vertices.cols(), 16);
-    EXPECT_NEAR(volume(result.mesh), 16, 1e-13);
+    EXPECT_NEAR(test::volume(result.mesh), 16, 1e-13);
     EXPECT_TRUE(says(result.repairs, "where parts touch taken apart"));
     int parts = 0;
     connected_parts(MeshTopology(result.mesh.triangles, 16), 24, parts);

@@ -77,4 +77,13 @@ inline TriangleMesh torus_mesh(int n, int m, double large, double small) {
   return mesh;
 }
 
+inline double volume(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Eigen::Vector3d x = mesh.vertices.col(a), y = mesh.vertices.col(b), z = mesh.vertices.col(c);
+    sum += x.dot(y.cross(z)) / 6;
+  }
+  return sum;
+}
+
 }  // namespace toile::test
