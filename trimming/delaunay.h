@@ -13,10 +13,16 @@
 namespace toile {
 
 using PlaneKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-// A vertex carries a number of the caller's, a face its nesting depth: odd in the material.
+// What a vertex carries: a number of the caller's. Where constraints cross, CGAL makes vertices that have none.
+struct VertexNumber {
+  VertexNumber(int n = -1) : number(n) {}
+  operator int() const { return number; }
+  int number;
+};
+// A face carries its nesting depth: odd in the material.
 using Delaunay = CGAL::Constrained_Delaunay_triangulation_2<
     PlaneKernel,
-    CGAL::Triangulation_data_structure_2<CGAL::Triangulation_vertex_base_with_info_2<int, PlaneKernel>,
+    CGAL::Triangulation_data_structure_2<CGAL::Triangulation_vertex_base_with_info_2<VertexNumber, PlaneKernel>,
                                          CGAL::Constrained_triangulation_face_base_2<
                                              PlaneKernel, CGAL::Triangulation_face_base_with_info_2<int, PlaneKernel>>>,
     CGAL::Exact_predicates_tag>;

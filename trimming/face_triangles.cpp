@@ -7,6 +7,7 @@
 
 #include "geometry/error.h"
 #include "geometry/measure.h"
+#include "trimming/text.h"
 #include "trimming/triangulation.h"
 
 namespace toile {
@@ -15,6 +16,9 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+// Of parameters: a curve evaluated at its end is off by no more, as a share of how large they are.
+constexpr double rounding = 1e-12;
 
 // Triangles that are halved where they are too far off.
 class Refinement {
@@ -29,7 +33,7 @@ class Refinement {
       for (int k = 0; k < static_cast<int>(loop.curves.size()); ++k) {
         const Curve2& curve = loop.curves[k].curve;
         for (const double t : {curve.domain().min, curve.domain().max})
-          if ((curve(t) - uv_[b.vertex]).norm() <= loop.gap + 1e-12 * uv_[b.vertex].norm())
+          if ((curve(t) - uv_[b.vertex]).norm() <= loop.gap + rounding * uv_[b.vertex].norm())
             trims_[b.vertex].push_back({b.loop, k, t});
       }
     }
@@ -174,7 +178,8 @@ class Refinement {
 
 FaceTriangles face_triangles(const TrimmedSurface& face, double chord_error) {
   if (!(chord_error > 0) || !std::isfinite(chord_error))
-    throw GeometryError("the chord error of a face must be positive");
+    throw GeometryError(place_name(face) + ": its chord error is " + text(chord_error) +
+                        ", must be positive and finite");
   constexpr double coarsest = 0.25;                // of the face's size
   constexpr std::size_t most_triangles = 1000000;  // of which the last round may make four
   const double size = bounding_box(face.surface).diagonal().norm();

@@ -258,10 +258,6 @@ class Mesher {
     }
     if (!any) return true;
     if (last) {
-      for (const auto v : delaunay_.finite_vertex_handles()) v->info() = -1;
-      std::size_t k = 0;
-      for (const auto& ring : handles)
-        for (const Delaunay::Vertex_handle v : ring) v->info() = out_.boundary[k++].vertex;
       for (const auto v : delaunay_.finite_vertex_handles()) {
         if (v->info() >= 0) continue;
         v->info() = static_cast<int>(out_.uv.size());

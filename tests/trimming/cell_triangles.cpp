@@ -83,6 +83,26 @@ TEST(CellTriangles, HolesStayHoles) {
   EXPECT_NEAR(expect_cells(surface, trace_trims(surface), {4, 4}), 16 - 1.25 * 1.25, 1e-12);
 }
 
+// A hole between a quarter of the rim and its chord: CGAL makes the vertices where the chord crosses the hole. What
+// lies within the chord or the hole, and not in both, counts as material.
+TEST(CellTriangles, ChordsThatCrossMeetInVertices) {
+  const Vector2d centre(0.5, 0.5), out = Vector2d(1, 1).normalized(), along = Vector2d(-1, 1).normalized();
+  const double radius = 0.45, chord = radius * std::sqrt(0.5), from = 0.3, to = 0.4, half = 0.05;
+  const auto corner = [&](double d, double t) -> Vector2d { return centre + d * out + t * along; };
+  const std::vector<Vector2d> hole{corner(from, -half), corner(from, half), corner(to, half), corner(to, -half)};
+  TrimmedSurface surface =
+      trimmed(unit_cells(2), {loop_of({round_curve(centre, radius)}), polygon_loop(hole, LoopKind::hole)});
+  validate_loops(surface);
+  const CellTriangles mesh = triangulate_cells(surface, trace_trims(surface), {1, 1});
+  EXPECT_EQ(mesh.uv.size(), 4u + 4 + 2);
+  double area = 0;
+  for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
+    EXPECT_GT(signed_area(mesh, k), 0);
+    area += signed_area(mesh, k);
+  }
+  EXPECT_NEAR(area, 2 * radius * radius + 2 * half * ((to - chord) - (chord - from)), 1e-14);
+}
+
 TEST(CellTriangles, TooManyAndNoneAreRefused) {
   TrimmedSurface surface = trimmed(unit_cells(2), {polygon_loop({{0, 0}, {2, 0}, {2, 2}, {0, 2}})});
   validate_loops(surface);
