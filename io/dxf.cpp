@@ -116,11 +116,9 @@ void DxfReader::name_what_is_left_out(const dxf::Drawing& drawing) {
   for (const dxf::Block& block : drawing.blocks)
     for (const Item& item : block.items)
       if (item.insert && !blocks.contains(item.insert->block)) ++missing[item.insert->block];
-  for (std::size_t k = 1; k < drawing.blocks.size(); ++k)
-    for (const Item& item : drawing.blocks[k].items)
-      if (item.insert && dxf::holds(drawing, item.insert->block, drawing.blocks[k].name))
-        warn(item.line, item.type + ": block '" + item.insert->block + "' holds block '" + drawing.blocks[k].name +
-                            "', in which it is inserted; it is left out there");
+  for (const auto& [block, item] : dxf::circular_inserts(drawing))
+    warn(item->line, item->type + ": block '" + item->insert->block + "' holds block '" + block->name +
+                         "', in which it is inserted; it is left out there");
   for (const dxf::Block& block : drawing.blocks) {
     for (const Item& item : block.items) {
       const auto named = item.insert ? missing.extract(item.insert->block) : decltype(missing)::node_type();

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <map>
 #include <set>
+#include <span>
 
 #include "geometry/text.h"
 #include "io/dxf/pairs.h"
@@ -108,6 +109,45 @@ Piece piece_of(const Block& block, std::vector<Item> items) {
   return out;
 }
 
+// Of nodes and where their edges lead: two have the same number where each leads to the other (Tarjan 1972, without
+// recursion: blocks nest as deep as a file likes).
+std::vector<int> circles(const std::vector<std::vector<int>>& edges) {
+  const std::size_t count = edges.size();
+  std::vector<int> out(count, -1), order(count, -1), low(count, 0), waiting;
+  struct Visit {
+    std::size_t node, next = 0;
+  };
+  std::vector<Visit> open;
+  int visited = 0, found = 0;
+  for (std::size_t start = 0; start < count; ++start) {
+    if (order[start] < 0) open.push_back({start});
+    while (!open.empty()) {
+      const std::size_t node = open.back().node;
+      if (order[node] < 0) {
+        order[node] = low[node] = visited++;
+        waiting.push_back(static_cast<int>(node));
+      }
+      if (open.back().next < edges[node].size()) {
+        const auto to = static_cast<std::size_t>(edges[node][open.back().next++]);
+        if (order[to] < 0)
+          open.push_back({to});
+        else if (out[to] < 0)
+          low[node] = std::min(low[node], order[to]);
+        continue;
+      }
+      open.pop_back();
+      if (!open.empty()) low[open.back().node] = std::min(low[open.back().node], low[node]);
+      if (low[node] < order[node]) continue;
+      while (out[node] < 0) {
+        out[static_cast<std::size_t>(waiting.back())] = found;
+        waiting.pop_back();
+      }
+      ++found;
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 bool Piece::on_layer(std::string_view layer) const {
@@ -120,17 +160,19 @@ std::vector<Piece> pieces_of(const Drawing& drawing) {
   std::vector<Piece> out;
   const Block& outside = drawing.blocks.front();
   out.push_back(piece_of(outside, expander.items(outside, {}, false)));
-  std::set<std::string> inserted;
+  std::set<std::string_view> inserted;
   for (const Block& block : drawing.blocks)
     for (const Item& item : block.items)
       if (item.insert) inserted.insert(item.insert->block);
+  std::map<std::string_view, std::vector<const Insert*>> outside_inserts;
+  for (const Item& item : outside.items)
+    if (item.insert) outside_inserts[item.insert->block].push_back(&*item.insert);
   // In the order of the blocks; of each, the ways it lies.
   for (std::size_t k = 1; k < drawing.blocks.size(); ++k) {
     const Block& block = drawing.blocks[k];
     std::vector<Affine> ways;
-    for (const Item& item : outside.items) {
-      if (!item.insert || item.insert->block != block.name) continue;
-      Affine map = Expander::placing(*item.insert, block);
+    for (const Insert* insert : outside_inserts[block.name]) {
+      Affine map = Expander::placing(*insert, block);
       if (map.linear.isIdentity(0)) map.shift.setZero();
       const auto same = [&](const Affine& way) { return (way.linear - map.linear).isZero(1e-12); };
       if (std::ranges::none_of(ways, same)) ways.push_back(map);
@@ -147,19 +189,24 @@ std::vector<Piece> pieces_of(const Drawing& drawing) {
   return out;
 }
 
-bool holds(const Drawing& drawing, const std::string& outer, const std::string& inner) {
-  std::vector<std::string> open{outer};
-  std::set<std::string> seen{outer};
-  while (!open.empty()) {
-    const std::string name = std::move(open.back());
-    open.pop_back();
-    if (name == inner) return true;
-    for (const Block& block : drawing.blocks)
-      for (const Item& item : block.items)
-        if (block.name == name && item.insert && seen.insert(item.insert->block).second)
-          open.push_back(item.insert->block);
-  }
-  return false;
+std::vector<std::pair<const Block*, const Item*>> circular_inserts(const Drawing& drawing) {
+  std::map<std::string_view, int> number;
+  for (const Block& block : std::span(drawing.blocks).subspan(1))
+    number.try_emplace(block.name, static_cast<int>(number.size()));
+  std::vector<std::vector<int>> inserts(number.size());
+  for (const Block& block : std::span(drawing.blocks).subspan(1))
+    for (const Item& item : block.items)
+      if (const auto to = item.insert ? number.find(item.insert->block) : number.end(); to != number.end())
+        inserts[static_cast<std::size_t>(number.at(block.name))].push_back(to->second);
+  const std::vector<int> circle = circles(inserts);
+  std::vector<std::pair<const Block*, const Item*>> out;
+  for (const Block& block : std::span(drawing.blocks).subspan(1))
+    for (const Item& item : block.items)
+      if (const auto to = item.insert ? number.find(item.insert->block) : number.end();
+          to != number.end() &&
+          circle[static_cast<std::size_t>(to->second)] == circle[static_cast<std::size_t>(number.at(block.name))])
+        out.emplace_back(&block, &item);
+  return out;
 }
 
 std::optional<std::string> value_of(const std::string& text, std::string_view key) {

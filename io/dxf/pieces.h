@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "io/dxf/drawing.h"
@@ -29,8 +30,9 @@ struct Piece {
 // nobody inserts; what stands outside of blocks, first.
 std::vector<Piece> pieces_of(const Drawing& drawing);
 
-// Is the block `inner` the block `outer`, or inserted in it, in blocks of it and so on?
-bool holds(const Drawing& drawing, const std::string& outer, const std::string& inner);
+// The inserts by which a block would be inserted in itself, at once or by way of others, each with its block; in the
+// file's order.
+std::vector<std::pair<const Block*, const Item*>> circular_inserts(const Drawing& drawing);
 
 // "Piece Name: FRONT" -> "FRONT" for the key "piece name", capitals or not.
 std::optional<std::string> value_of(const std::string& text, std::string_view key);

@@ -418,6 +418,18 @@ TEST(Dxf, BlocksInBlocksAreReadOrNamed) {
             std::string::npos);
   expect_error(file(block("A", poly("1", rectangle, true)), insert("A", " 41\n0\n") + metric),
                "INSERT: block 'A' has the scale 0");
+// So many that looking through all blocks for each insert would take hours.
+TEST(Dxf, BlocksMayNestDeep) {
+  constexpr int depth = 20000;
+  const std::string piece = poly("1", rectangle, true);
+  const auto name = [](int k) { return "B" + std::to_string(k); };
+  std::string chain;
+  for (int k = 0; k < depth; ++k) chain += block(name(k), insert(name(k + 1)));
+  const auto read = [&](const std::string& last) {
+    return parse_dxf(file(block("A", piece) + chain + block(name(depth), last), insert("A") + metric), "p.dxf");
+  };
+  EXPECT_TRUE(read(piece).warnings.empty());
+  EXPECT_EQ(read(insert(name(depth - 9))).warnings.size(), 10u) << "of the circle, not of what leads to it";
 }
 
 TEST(Dxf, VerticesOfAFittedPolylinesFrameAreNoCorners) {
