@@ -9,6 +9,7 @@
 
 #include "geometry/error.h"
 #include "geometry/finite.h"
+#include "geometry/smooth_step.h"
 #include "geometry/text.h"
 #include "geometry/triangle.h"
 
@@ -100,7 +101,7 @@ MeshObstacle::ShapeTime MeshObstacle::shape_time(double t) const {
   if (t >= times.back()) return {static_cast<int>(times.size()) - 2, 1};
   const int k = static_cast<int>(std::ranges::upper_bound(times, t) - times.begin()) - 1;
   const double s = (t - times[k]) / (times[k + 1] - times[k]);
-  return {k, motion_.smooth ? s * s * s * (10 + s * (-15 + 6 * s)) : s};
+  return {k, motion_.smooth ? smooth_step(s) : s};
 }
 
 Matrix3Xd MeshObstacle::shape(const ShapeTime& time) const {

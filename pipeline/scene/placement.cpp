@@ -3,8 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
+#include "geometry/smooth_step.h"
 #include "pipeline/scene/readers.h"
 
 namespace toile {
@@ -13,8 +12,7 @@ namespace {
 
 // The part of a motion that is done.
 double done_share(const PinMotion& motion, double t) {
-  const double tau = std::clamp((t - motion.start) / (motion.end - motion.start), 0.0, 1.0);
-  return tau * tau * tau * (10 + tau * (-15 + 6 * tau));
+  return smooth_step((t - motion.start) / (motion.end - motion.start));
 }
 
 }  // namespace
