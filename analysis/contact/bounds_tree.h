@@ -36,8 +36,6 @@ class BoundsTree {
   void refit(std::span<const Box> boxes);
 
   int size() const { return static_cast<int>(order_.size()); }
-  // Of all boxes; empty where there are none.
-  const Box& bounds() const { return nodes_[0]; }
 
   // found(k) for each box within `gap` of `box`.
   template <class Found>
@@ -53,9 +51,6 @@ class BoundsTree {
   template <class DistanceSquared>
   std::optional<Nearest> nearest(const Eigen::Vector3d& p, double reach, const DistanceSquared& distance_squared) const;
 
-  // found(j, k) for each pair of a box j here and a box k of the other tree within `gap` of each other.
-  template <class Found>
-  void pairs(const BoundsTree& other, double gap, const Found& found) const;
   // found(j, k) with j < k for each two boxes here within `gap` of each other, once.
   template <class Found>
   void own_pairs(double gap, const Found& found) const;
@@ -134,31 +129,6 @@ std::optional<BoundsTree::Nearest> BoundsTree::nearest(const Eigen::Vector3d& p,
   }
   if (best.box < 0) return std::nullopt;
   return best;
-}
-
-template <class Found>
-void BoundsTree::pairs(const BoundsTree& other, double gap, const Found& found) const {
-  require_query(gap);
-  std::array<std::pair<int, int>, most_open> open;
-  int count = 0;
-  open[count++] = {0, 0};
-  while (count > 0) {
-    const auto [a, b] = open[--count];
-    if (!within(nodes_[a], other.nodes_[b], gap)) continue;
-    const bool a_last = is_last(a), b_last = other.is_last(b);
-    if (a_last && b_last) {
-      const auto [begin, end] = slice(a);
-      const auto [other_begin, other_end] = other.slice(b);
-      for (int i = begin; i < end; ++i)
-        for (int j = other_begin; j < other_end; ++j)
-          if (within(boxes_[i], other.boxes_[j], gap)) found(order_[i], other.order_[j]);
-      continue;
-    }
-    // The larger of the two is parted.
-    const bool part_a =
-        !a_last && (b_last || nodes_[a].diagonal().squaredNorm() >= other.nodes_[b].diagonal().squaredNorm());
-    for (const int child : {2, 1}) open[count++] = part_a ? std::pair(2 * a + child, b) : std::pair(a, 2 * b + child);
-  }
 }
 
 template <class Found>

@@ -89,16 +89,6 @@ TEST(BoundsTree, FindsWhatASearchOfAllBoxesFinds) {
       const std::vector<Box> moved = random.make(count, (kind + 1) % 6);
       tree.refit(moved);
       expect_as_a_search_of_all(tree, moved, random);
-
-      const std::vector<Box> others = random.make(count / 2 + 3, kind);
-      for (const double gap : {0.0, 0.1}) {
-        std::multiset<std::pair<int, int>> found, expected;
-        tree.pairs(BoundsTree(others), gap, [&](int i, int j) { found.emplace(i, j); });
-        for (int i = 0; i < count; ++i)
-          for (int j = 0; j < static_cast<int>(others.size()); ++j)
-            if (within(moved[i], others[j], gap)) expected.emplace(i, j);
-        EXPECT_EQ(found, expected);
-      }
     }
 }
 
