@@ -2,6 +2,7 @@
 #include "pipeline/build/build.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -262,6 +263,14 @@ PanelParts build_panel(const PanelFile& file, const ScenePanel& panel, PointRule
   return parts;
 }
 
+std::vector<std::unique_ptr<Obstacle>> obstacles_of(Build& result) {
+  BuiltObstacles built = build_obstacles(result.scene);
+  if (!built.faults.empty()) throw InputError(fmt::format("{}", fmt::join(built.faults, "\n")));
+  result.warnings.insert(result.warnings.end(), built.warnings.begin(), built.warnings.end());
+  result.notes.insert(result.notes.end(), built.notes.begin(), built.notes.end());
+  return std::move(built.obstacles);
+}
+
 }  // namespace
 
 int Build::panel(const std::string& name) const {
@@ -271,7 +280,7 @@ int Build::panel(const std::string& name) const {
   throw InputError(fmt::format("no panel is called '{}'", name));
 }
 
-Build build(Scene scene) {
+Build build(Scene scene, std::optional<std::vector<std::unique_ptr<Obstacle>>> obstacles) {
   Build result;
   result.scene = std::move(scene);
   const Clock::time_point reading = Clock::now();
@@ -385,12 +394,7 @@ Build build(Scene scene) {
     const int k = result.panel(load.panel);
     const BuiltPanel& panel = result.panels[static_cast<std::size_t>(k)];
     const NurbsSurface& rest = result.rest(k);
-    const auto end = [](const KnotVector& knots, int which) {
-      return which == 0 ? knots.domain().min : knots.domain().max;
-    };
-    const Eigen::Vector2d uv = load.at.kind == Address::Kind::uv
-                                   ? load.at.uv
-                                   : Eigen::Vector2d(end(rest.u(), load.at.a), end(rest.v(), load.at.b));
+    const Eigen::Vector2d uv = point_uv(load.at, rest);
     if (!in_material(panel.face, panel.topology, uv)) {
       throw GeometryError(fmt::format("{}: force {} ({}) is not on the material of panel '{}'", load.where, f,
                                       load.at.text, panel.name));
@@ -415,7 +419,7 @@ Build build(Scene scene) {
     }
   }
   if (touches(result.scene)) {
-    result.obstacles = build_obstacles(result.scene, result.warnings, result.notes);
+    result.obstacles = obstacles ? std::move(*obstacles) : obstacles_of(result);
     result.proxies = contact_proxies(result, result.warnings, result.notes);
   }
   for (const OutputPoint& point : result.scene.points) {

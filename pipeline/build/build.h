@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -57,8 +58,10 @@ struct Build {
   Eigen::Matrix3Xd net(int panel, const Eigen::VectorXd& q) const { return model->net(panel, q); }
 };
 
-// Throws InputError (files, names), GeometryError (panel, loop, place; pin or traction on a trimmed-away place).
-Build build(Scene scene);
+// `obstacles`: those of the scene where they have been built already, and what is to be said of them has been said.
+// Throws InputError (files, names; all obstacles that can't be built), GeometryError (panel, loop, place; pin or
+// traction on a trimmed-away place).
+Build build(Scene scene, std::optional<std::vector<std::unique_ptr<Obstacle>>> obstacles = std::nullopt);
 
 // The longest knot span of the panels at rest [m]: chords along the knot lines.
 double longest_span(const Build& build);

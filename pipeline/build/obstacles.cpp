@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "analysis/contact/mesh_obstacle.h"
@@ -26,19 +27,15 @@ std::string title(const SceneObstacle& obstacle) {
   return fmt::format("{}: obstacle '{}'", obstacle.where, obstacle.name);
 }
 
-// The scene's axis against gravity, of y and z.
-char up_axis(const Scene& scene) {
-  return std::abs(scene.gravity.y()) > std::abs(scene.gravity.z()) ? 'y' : 'z';
-}
-
 // From the file's unit and axes to the scene's, at the start.
 Eigen::Affine3d placing(const Scene& scene, const SceneObstacle& obstacle, double metres_per_unit) {
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  if (obstacle.up && *obstacle.up != up_axis(scene)) {
-    if (*obstacle.up == 'y')
-      turn << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-    else
-      turn << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  if (obstacle.up) {
+    // The smallest turn; a half turn, whose axis nothing chooses, goes about x.
+    constexpr double opposite = -1 + 1e-12;  // a cosine; rounding leaves no axis below it
+    const Vector3d from = *obstacle.up == 'y' ? Vector3d::UnitY() : Vector3d::UnitZ(), to = up(scene);
+    turn = from.dot(to) < opposite ? Eigen::Matrix3d(Eigen::AngleAxisd(std::numbers::pi, Vector3d::UnitX()))
+                                   : Eigen::Quaterniond::FromTwoVectors(from, to).toRotationMatrix();
   }
   Eigen::Affine3d out;
   out.linear() = metres_per_unit * obstacle.place.rotation() * turn;
@@ -50,10 +47,15 @@ Eigen::Matrix3Xd placed(const Eigen::Affine3d& placing, const Eigen::Matrix3Xd& 
   return (placing.linear() * vertices).colwise() + placing.translation();
 }
 
-// Advice where no body that cloth is draped over has this size [m].
-std::string size_advice(double size, double metres_per_unit) {
+// Advice where no body that cloth is draped over has this size [m]. An IGES file says its own unit.
+std::string size_advice(double size, double metres_per_unit, bool says_unit) {
   constexpr double least = 0.02, most = 50, usual = 1.7;
   if (size >= least && size <= most) return "";
+  if (says_unit)
+    return fmt::format(
+        "it is {:.4g} m large, as its file says that a unit is {:.4g} m: if that is wrong, write the file again with "
+        "the right unit in its global section",
+        size, metres_per_unit);
   static constexpr std::array<std::pair<const char*, double>, 4> units{
       {{"mm", 1e-3}, {"cm", 1e-2}, {"inch", 0.0254}, {"m", 1}}};
   std::string advice;
@@ -146,7 +148,8 @@ BuiltObstacle build_mesh(const Scene& scene, const SceneObstacle& obstacle) {
   const Eigen::Matrix3Xd vertices = placed(to_scene, repaired.mesh.vertices);
   const Eigen::AlignedBox3d box(vertices.rowwise().minCoeff(), vertices.rowwise().maxCoeff());
   const Vector3d size = box.diagonal();
-  if (const std::string advice = size_advice(size.maxCoeff(), file.metres_per_unit); !advice.empty())
+  if (const std::string advice = size_advice(size.maxCoeff(), file.metres_per_unit, obstacle.chord_error > 0);
+      !advice.empty())
     out.warnings.push_back(start + advice);
   out.about =
       fmt::format("obstacle '{}': {} triangles, {}, {:.3g} x {:.3g} x {:.3g} m", obstacle.name,
@@ -207,23 +210,12 @@ BuiltObstacle build_obstacle(const Scene& scene, const SceneObstacle& obstacle) 
   return build_mesh(scene, obstacle);
 }
 
-std::vector<std::unique_ptr<Obstacle>> build_obstacles(const Scene& scene, std::vector<std::string>& warnings,
-                                                       std::vector<std::string>& notes) {
-  std::vector<std::unique_ptr<Obstacle>> out;
-  for (const SceneObstacle& obstacle : scene.obstacles) {
-    BuiltObstacle built = build_obstacle(scene, obstacle);
-    out.push_back(std::move(built.obstacle));
-    warnings.insert(warnings.end(), built.warnings.begin(), built.warnings.end());
-    notes.insert(notes.end(), built.notes.begin(), built.notes.end());
-  }
-  return out;
-}
-
-ObstacleCheck check_obstacles(const Scene& scene) {
-  ObstacleCheck out;
+BuiltObstacles build_obstacles(const Scene& scene) {
+  BuiltObstacles out;
   for (const SceneObstacle& obstacle : scene.obstacles) {
     try {
-      const BuiltObstacle built = build_obstacle(scene, obstacle);
+      BuiltObstacle built = build_obstacle(scene, obstacle);
+      out.obstacles.push_back(std::move(built.obstacle));
       out.about.push_back(built.about);
       out.warnings.insert(out.warnings.end(), built.warnings.begin(), built.warnings.end());
       out.notes.insert(out.notes.end(), built.notes.begin(), built.notes.end());

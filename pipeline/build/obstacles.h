@@ -22,15 +22,12 @@ struct BuiltObstacle {
 // place of the file and remedy.
 BuiltObstacle build_obstacle(const Scene& scene, const SceneObstacle& obstacle);
 
-// All of a scene, in its order; what is to be said is added to `warnings` and `notes`.
-std::vector<std::unique_ptr<Obstacle>> build_obstacles(const Scene& scene, std::vector<std::string>& warnings,
-                                                       std::vector<std::string>& notes);
-
-// What can be said of all obstacles of a scene, also where some of them can't be.
-struct ObstacleCheck {
+// All of a scene, in its order, as far as they can be built.
+struct BuiltObstacles {
+  std::vector<std::unique_ptr<Obstacle>> obstacles;
   std::vector<std::string> about, warnings, notes;
   std::vector<std::string> faults;  // why one can't be
 };
-ObstacleCheck check_obstacles(const Scene& scene);
+BuiltObstacles build_obstacles(const Scene& scene);
 
 }  // namespace toile

@@ -19,8 +19,7 @@ namespace {
 std::vector<Eigen::Vector2d> marks(const Address& at, const NurbsSurface& rest) {
   const Interval u = rest.u().domain(), v = rest.v().domain();
   const auto end = [](const Interval& d, int e) { return e == 0 ? d.min : d.max; };
-  if (at.kind == Address::Kind::uv) return {at.uv};
-  if (at.kind == Address::Kind::corner) return {{end(u, at.a), end(v, at.b)}};
+  if (at.kind == Address::Kind::uv || at.kind == Address::Kind::corner) return {point_uv(at, rest)};
   std::vector<Eigen::Vector2d> points;
   if (at.kind == Address::Kind::edge) {
     for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) {

@@ -317,14 +317,19 @@ bool in_material(const TrimmedSurface& face, const TrimTopology& topology, const
   return false;
 }
 
+Eigen::Vector2d point_uv(const Address& at, const NurbsSurface& surface) {
+  if (at.kind == Address::Kind::uv) return at.uv;
+  const Interval u = surface.u().domain(), v = surface.v().domain();
+  return {at.a == 0 ? u.min : u.max, at.b == 0 ? v.min : v.max};
+}
+
 HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, const std::string& who) {
   const NurbsSurface& surface = panel.rest;
   const int n_u = surface.count_u(), n_v = surface.count_v();
   HeldPlace held;
   switch (at.kind) {
     case Address::Kind::corner: {
-      const Eigen::Vector2d uv(at.a == 0 ? surface.u().domain().min : surface.u().domain().max,
-                               at.b == 0 ? surface.v().domain().min : surface.v().domain().max);
+      const Eigen::Vector2d uv = point_uv(at, surface);
       if (!contains(panel.face, panel.topology, uv)) {
         throw GeometryError(
             fmt::format("{}: corner ({}, {}) of panel '{}' is trimmed away; address the material instead "

@@ -70,6 +70,9 @@ struct PanelPlaces {
 // Is the point in the material, or on its border within 1e-9 of the domain's size? Corners of trims are rarely doubles.
 bool in_material(const TrimmedSurface& face, const TrimTopology& topology, const Eigen::Vector2d& uv);
 
+// Parameters of a corner: or uv: address, in the material or not.
+Eigen::Vector2d point_uv(const Address& at, const NurbsSurface& surface);
+
 // `who` starts the messages: "scene.toml:12: pin 0 (corner:0,0)". Throws GeometryError where the place is trimmed away,
 // outside the panel or doesn't exist; InputError for a clamp that this place can't have.
 HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, const std::string& who);

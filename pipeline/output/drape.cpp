@@ -72,17 +72,11 @@ std::map<std::string, int> unused(const System& system) {
 // What the scene names and no part of this version simulates: a drape without it would be another one, so it is
 // refused.
 std::vector<std::string> not_simulated(const Scene& scene) {
-  std::vector<std::string> out;
-  const auto add = [&](const auto& tables, const char* key, const char* words) {
-    if (tables.empty()) return;
-    out.push_back(
-        fmt::format("{}: {} are not simulated by this version; drape without the {} [[{}]] table{} with "
-                    "--set '{}=[]'",
-                    tables.front().where, words, tables.size(), key, tables.size() == 1 ? "" : "s", key));
-  };
-  add(scene.seams, "seam", "seams");
-  add(scene.contact_pairs, "contact_pair", "contact pairs");
-  return out;
+  if (scene.seams.empty()) return {};
+  return {
+      fmt::format("{}: seams are not simulated by this version; drape without the {} [[seam]] table{} with "
+                  "--set 'seam=[]'",
+                  scene.seams.front().where, scene.seams.size(), scene.seams.size() == 1 ? "" : "s")};
 }
 
 void refuse_not_simulated(const Scene& scene) {
@@ -359,56 +353,89 @@ int dry_run(Scene scene, bool json, Console& console) {
 
 namespace {
 
-void tell(const ObstacleCheck& obstacles, Console& console) {
-  for (const std::string& about : obstacles.about) fmt::print("{}\n", about);
-  for (const std::string& note : obstacles.notes) console.note(note);
-  for (const std::string& warning : obstacles.warnings) console.warning(warning);
-  for (const std::string& fault : obstacles.faults) console.error(fault);
+struct SceneCheck {
+  std::string scene, path;
+  std::vector<std::string> panels, obstacles;  // each in a line
+  nlohmann::ordered_json panel_table = nlohmann::ordered_json::array();
+  std::vector<std::string> errors, warnings, notes, details;
+  ExitCode code = exit_ok;
+};
+
+void add(std::vector<std::string>& all, const std::vector<std::string>& more) {
+  all.insert(all.end(), more.begin(), more.end());
 }
 
-std::vector<std::string> joined(std::vector<std::string> first, const std::vector<std::string>& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
+void check_built(const Build& built, SceneCheck& out) {
+  add(out.warnings, built.warnings);
+  add(out.details, built.notes);
+  for (std::size_t k = 0; k < built.panels.size(); ++k) {
+    const BuiltPanel& panel = built.panels[k];
+    out.panels.push_back(describe(built, k));
+    out.panel_table.push_back({{"name", panel.name},
+                               {"control_points", {panel.face.surface.count_u(), panel.face.surface.count_v()}},
+                               {"constraint_points", panel.points.size()}});
+  }
+  add(out.warnings, assemble(built, 0)->warnings);
+}
+
+// Goes on as far as it can: a fault of an obstacle hides none of a panel.
+SceneCheck check(const std::function<Scene()>& read) {
+  SceneCheck out;
+  const auto fail = [&](const std::string& why, ExitCode code) {
+    out.errors.push_back(why);
+    if (out.code == exit_ok) out.code = code;
+  };
+  try {
+    Scene scene = read();
+    out.scene = scene.name;
+    out.path = scene.path.string();
+    out.notes = scene.notes;
+    // What `drape` refuses isn't valid.
+    for (const std::string& reason : not_simulated(scene)) fail(reason, exit_input);
+    BuiltObstacles obstacles = build_obstacles(scene);
+    out.obstacles = obstacles.about;
+    add(out.warnings, obstacles.warnings);
+    add(out.notes, obstacles.notes);
+    for (const std::string& fault : obstacles.faults) fail(fault, exit_input);
+    if (!obstacles.faults.empty()) {
+      scene.obstacles.clear();
+      obstacles.obstacles.clear();
+    }
+    check_built(build(std::move(scene), std::move(obstacles.obstacles)), out);
+  } catch (const InputError& error) {
+    fail(error.what(), exit_input);
+  } catch (const GeometryError& error) {
+    fail(error.what(), exit_geometry);
+  }
+  return out;
 }
 
 }  // namespace
 
-int check_scene(Scene scene, bool json, Console& console) {
-  const ObstacleCheck obstacles = check_obstacles(scene);
-  if (!json) {
-    tell(obstacles, console);
-    for (const std::string& note : scene.notes) console.note(note);
-  }
-  const Build built = build(std::move(scene));
-  const std::unique_ptr<System> system = assemble(built, 0);
-  const std::vector<std::string> idle = not_simulated(built.scene);
-  const bool valid = idle.empty() && obstacles.faults.empty();
+int check_scene(const std::function<Scene()>& read, bool json, Console& console) {
+  const SceneCheck found = check(read);
   if (json) {
     nlohmann::ordered_json out;
-    out["scene"] = built.scene.name;
-    out["valid"] = valid;
-    out["panels"] = nlohmann::ordered_json::array();
-    for (const BuiltPanel& panel : built.panels) {
-      out["panels"].push_back({{"name", panel.name},
-                               {"control_points", {panel.face.surface.count_u(), panel.face.surface.count_v()}},
-                               {"constraint_points", panel.points.size()}});
-    }
-    out["obstacles"] = obstacles.about;
-    out["errors"] = obstacles.faults;
-    out["warnings"] = joined(obstacles.warnings, built.warnings);
-    out["notes"] = joined(joined(obstacles.notes, built.scene.notes), built.notes);
-    out["not_simulated"] = idle;
+    out["scene"] = found.scene;
+    out["valid"] = found.errors.empty();
+    out["panels"] = found.panel_table;
+    out["obstacles"] = found.obstacles;
+    out["errors"] = found.errors;
+    out["warnings"] = found.warnings;
+    std::vector<std::string> notes = found.notes;
+    add(notes, found.details);
+    out["notes"] = notes;
     fmt::print("{}\n", json_text(out));
-    return valid ? exit_ok : exit_input;
+    return found.code;
   }
-  for (const std::string& warning : built.warnings) console.warning(warning);
-  for (const std::string& note : built.notes) console.detail(note);
-  for (std::size_t k = 0; k < built.panels.size(); ++k) fmt::print("{}\n", describe(built, k));
-  // What `drape` refuses isn't valid.
-  for (const std::string& reason : idle) console.error(reason);
-  if (!valid) return exit_input;
-  fmt::print("{}: valid\n", built.scene.path.string());
-  return exit_ok;
+  for (const auto* lines : {&found.obstacles, &found.panels})
+    for (const std::string& line : *lines) fmt::print("{}\n", line);
+  for (const std::string& note : found.notes) console.note(note);
+  for (const std::string& note : found.details) console.detail(note);
+  for (const std::string& warning : found.warnings) console.warning(warning);
+  for (const std::string& error : found.errors) console.error(error);
+  if (found.errors.empty()) fmt::print("{}: valid\n", found.path);
+  return found.code;
 }
 
 }  // namespace toile

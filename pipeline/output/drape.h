@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -30,7 +31,8 @@ int drape(Scene scene, const DrapeOptions& options, Console& console);
 // constraint rows that aren't used and why. Writes nothing.
 int dry_run(Scene scene, bool json, Console& console);
 
-// Builds the scene, pins and loads included, reads and checks every obstacle, and lists panels and obstacles.
-int check_scene(Scene scene, bool json, Console& console);
+// Reads and builds the scene, pins and loads included, and every obstacle; lists panels and obstacles, and all faults.
+// With `json` the verdict goes to stdout, whatever is wrong with the input. Returns the exit code of the first fault.
+int check_scene(const std::function<Scene()>& read, bool json, Console& console);
 
 }  // namespace toile

@@ -22,7 +22,7 @@ Action check_command(Command& command) {
   return [a](const Common& common, Console& console) {
     if (std::filesystem::path(a->input).extension() != ".toml")
       throw UsageError(fmt::format("{0} is no scene: `toile inspect {0}` looks at panel files", a->input));
-    return check_scene(scene_of(*a), common.json, console);
+    return check_scene([&] { return scene_of(*a); }, common.json, console);
   };
 }
 

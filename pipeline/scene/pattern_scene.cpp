@@ -353,12 +353,11 @@ std::string head_text(const std::filesystem::path& path, const std::filesystem::
       "# {} as a scene: toile init --pattern. Lengths in metres, or with units: \"20 mm\"; y points up.\n"
       "# toile inspect {} --svg panels.svg     shows the loop and curve numbers used below\n",
       path.filename().string(), path_from(scene, path));
-  if (!out.without.empty()) {
+  if (!out.without.empty())
     text += fmt::format(
         "# Seams are not simulated by this version. Without them each panel drapes alone:\n"
-        "#   toile drape scene.toml{}\n",
-        out.without);
-  }
+        "#   toile drape {}{}\n",
+        scene.filename().string(), out.without);
   return text;
 }
 
@@ -402,8 +401,7 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
   out.warnings = pattern.file.warnings;
   out.details = pattern.file.notes;
   out.refused = pattern.file.refused;
-  if (!pattern.stitches.empty()) out.without += " --set 'seam=[]'";
-  if (body) out.without += " --set 'obstacle=[]'";
+  if (!pattern.stitches.empty()) out.without = " --set 'seam=[]'";
   std::string& text = out.text;
   text = head_text(path, scene, out);
   bool drawing = false;

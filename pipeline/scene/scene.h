@@ -173,6 +173,8 @@ struct Scene {
 bool implicit(const Scene& scene);
 // Whether anything may touch.
 bool touches(const Scene& scene);
+// Unit vector against gravity; z where there is none.
+Eigen::Vector3d up(const Scene& scene);
 
 // Reads a scene; `settings` are "key.path=value" with TOML values (a value that isn't TOML is taken as a string) and
 // override or add keys. Throws InputError `scene.toml:12: ...`.

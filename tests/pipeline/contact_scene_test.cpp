@@ -124,7 +124,7 @@ TEST(ContactScene, ImplicitSchemesRefuseContact) {
 
 TEST(ContactScene, ClothMayRestOnATableWithoutPins) {
   const Folder folder("rest");
-  const Build b = built(folder, scene_over(ball), {"solver.until=rest", "solver.rest={tolerance=1e-3}"});
+  const Build b = built(folder, scene_over(table), {"solver.until=rest", "solver.rest={tolerance=1e-3}"});
   const RunResult result = run(b);
   EXPECT_EQ(result.exit, RunExit::ok) << result.reason;
 }

@@ -76,7 +76,7 @@ TEST(Obstacles, AMeshIsPutWhereTheSceneSays) {
   EXPECT_EQ(box.about, "obstacle 'box': 12 triangles, closed, 0.5 x 1 x 0.25 m");
   EXPECT_TRUE(box.warnings.empty() && box.notes.empty());
   EXPECT_NEAR(distance(box, {0, 0.6, 0}), 0.1, 1e-7);
-  // 1 cm for 1 m, a quarter turn about z, then 1 m up.
+  // 10 cm for 1 m, a quarter turn about z, then 1 m up.
   const BuiltObstacle placed =
       folder.build("mesh = \"box.obj\", unit = \"dm\", place = { translate = [0, 0, 1], rotate_deg = [0, 0, 90] }");
   EXPECT_NEAR(distance(placed, {0.06, 0, 1}), 0.01, 1e-7);
@@ -87,6 +87,29 @@ TEST(Obstacles, AMeshIsPutWhereTheSceneSays) {
   const std::string y_up = "[load]\ngravity = [0, -9.81, 0]\n";
   EXPECT_NEAR(distance(folder.build("mesh = \"box.obj\", up = \"y\"", y_up), {0, 0.6, 0}), 0.1, 1e-7);
   EXPECT_NEAR(distance(folder.build("mesh = \"box.obj\", up = \"z\"", y_up), {0, 0.225, 0}), 0.1, 1e-7);
+}
+
+// Up is against gravity, whichever way that points. The box's corner of all its greatest coordinates has a spike.
+TEST(Obstacles, UpIsAgainstGravity) {
+  const Bodies folder("obstacle_up");
+  TriangleMesh cone = test::box_mesh({0.25, 0.5, 0.125});
+  cone.vertices.col(7).y() = 1;
+  write_file(folder / "spike.obj", obj_text(cone));
+  const Vector3d tip(0.25, 1, 0.125);
+  for (const auto& [gravity, way] : {std::pair{"[0, 0, -9.81]", Vector3d(0, 0, 1)},
+                                     {"[0, 0, 9.81]", Vector3d(0, 0, -1)},
+                                     {"[0, 9.81, 0]", Vector3d(0, -1, 0)},
+                                     {"[-9.81, 0, 0]", Vector3d(1, 0, 0)},
+                                     {"[0, -3, -4]", Vector3d(0, 0.6, 0.8)}}) {
+    SCOPED_TRACE(gravity);
+    const BuiltObstacle built =
+        folder.build("mesh = \"spike.obj\", up = \"y\"", fmt::format("[load]\ngravity = {}\n", gravity));
+    // The spike reaches 1 m up; nothing else of the box is higher than 0.5 m or wider than 0.3 m.
+    const auto highest = built.obstacle->nearest(3 * way, infinite);
+    ASSERT_TRUE(highest);
+    EXPECT_NEAR(highest->distance, (Vector3d(0, 3, 0) - tip).norm(), 1e-7);
+    EXPECT_NEAR(distance(built, -3 * way), 2.5, 1e-7);
+  }
 }
 
 // Each seen from a place whose distance is known; turned a quarter about x, which takes y to z, then 1 m along x.
@@ -184,7 +207,7 @@ TEST(Obstacles, FaultsOfAMeshAreRepairedAndSaidOrRefusedWithTheirPlace) {
       "obstacle = [{ mesh = \"nan.obj\" }, { mesh = \"box.obj\" }, { mesh = \"nothing.obj\" }]\n[[panel]]\nfile = "
       "\"panel.txt\"\n",
       folder / "scene.toml");
-  const ObstacleCheck check = check_obstacles(scene);
+  const BuiltObstacles check = build_obstacles(scene);
   EXPECT_EQ(check.faults.size(), 2u);
   EXPECT_EQ(check.about.size(), 1u);
 }
@@ -234,11 +257,14 @@ std::vector<TrimmedSurface> can() {
   return faces;
 }
 
-double volume(const TriangleMesh& mesh) {
-  double sum = 0;
-  for (const Triangle& t : mesh.triangles)
-    sum += mesh.vertices.col(t[0]).dot(Vector3d(mesh.vertices.col(t[1])).cross(Vector3d(mesh.vertices.col(t[2])))) / 6;
-  return sum;
+TEST(Obstacles, AnAbsurdSizeOfAnIgesBodyIsTheFilesUnit) {
+  const Bodies folder("obstacle_iges_size");
+  std::vector<TrimmedSurface> small = can();
+  for (TrimmedSurface& face : small) face.metres_per_unit = 1e-6;
+  test::write_panels(folder / "can.igs", small);
+  const BuiltObstacle built = folder.build("mesh = \"can.igs\", chord_error = \"1 um\"");
+  EXPECT_TRUE(says(built.warnings, "as its file says that a unit is 1e-06 m")) << built.warnings.size();
+  for (const std::string& warning : built.warnings) EXPECT_EQ(warning.find("unit = "), std::string::npos) << warning;
 }
 
 // Off by no more than the area times the chord error, whatever the faces' own points along their common edges.
@@ -261,7 +287,7 @@ TEST(Obstacles, FacesOfAnIgesFileBecomeOneClosedBody) {
       const IgesBody body = read_iges_body(file, 1e-3 * chord_error);
       const RepairedMesh repaired = repair_mesh(body.mesh);
       ASSERT_TRUE(repaired.closed) << repaired.warnings[0];
-      EXPECT_NEAR(volume(repaired.mesh), exact, area * chord_error);
+      EXPECT_NEAR(test::volume(repaired.mesh), exact, area * chord_error);
     }
   const BuiltObstacle built = folder.build("mesh = \"can.igs\", up = \"y\"");
   EXPECT_NE(built.about.find("closed, 0.2 x 0.3 x 0.2 m"), std::string::npos) << built.about;

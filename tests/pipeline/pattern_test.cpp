@@ -240,17 +240,13 @@ TEST(PatternScene, DrapeSaysWhatItLeavesOut) {
   EXPECT_EQ(run(folder, "check scene.toml" + coarse), 3) << "what drape refuses isn't valid";
   EXPECT_NE(read_file(folder / "stderr.txt").find("seams are not simulated"), std::string::npos);
   EXPECT_EQ(read_file(folder / "stdout.txt").find("valid"), std::string::npos);
-  EXPECT_EQ(run(folder, "check scene.toml --set 'seam=[]' --set 'obstacle=[]'" + coarse), 0)
-      << read_file(folder / "stderr.txt");
+  EXPECT_EQ(run(folder, "check scene.toml --set 'seam=[]'" + coarse), 0) << read_file(folder / "stderr.txt");
   EXPECT_EQ(run(folder, "drape scene.toml -o out" + coarse), 3);
   const std::string refusal = read_file(folder / "stderr.txt");
   EXPECT_NE(refusal.find("error: scene.toml:"), std::string::npos) << refusal;
   EXPECT_NE(refusal.find("--set 'seam=[]'"), std::string::npos) << refusal;
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
-  EXPECT_EQ(run(folder,
-                "drape scene.toml -o out --until 0.02 --set 'seam=[]' --set 'obstacle=[]' --set output.preview=false" +
-                    coarse),
-            0)
+  EXPECT_EQ(run(folder, "drape scene.toml -o out --until 0.02 --set 'seam=[]' --set output.preview=false" + coarse), 0)
       << read_file(folder / "stderr.txt");
   EXPECT_EQ(run(folder, "check scene.toml --set seam.0.a.curve=17"), 4);
   EXPECT_NE(read_file(folder / "stderr.txt").find("panel 'front' has no curve 0,17"), std::string::npos);

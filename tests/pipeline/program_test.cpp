@@ -56,6 +56,86 @@ void expect_same_results(const std::filesystem::path& a, const std::filesystem::
   EXPECT_EQ(report(a), report(b));
 }
 
+// Below the cloth, which hangs beside it.
+const std::string floor_table =
+    "[[obstacle]]\nshape = \"plane\"\nname = \"floor\"\npoint = [0, 0, -9]\nnormal = [0, 0, 1]\n";
+
+TEST(Program, DrapesAClothWithAContactPair) {
+  const Small folder("contact_pair");
+  write_file(folder / "scene.toml",
+             test::scene_text("[[pin]]\nat = \"curve:0,2\"\n",
+                              floor_table + "[[contact_pair]]\na = \"cloth\"\nb = \"floor\"\nfriction = 0.7\n"));
+  const Outcome check = toile(folder, "check scene.toml"), run = toile(folder, "drape scene.toml -o out");
+  EXPECT_EQ(check.code, 0) << check.err;
+  EXPECT_EQ(run.code, 0) << run.err;
+}
+
+int count(const std::string& text, const std::string& words) {
+  int n = 0;
+  for (std::size_t at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++n;
+  return n;
+}
+
+TEST(Program, ACheckSaysEveryFaultAndWarningOfObstaclesOnce) {
+  const Small folder("faulty_obstacles");
+  const std::string open_mesh = "v 0 0 -9\nv 1 0 -9\nv 0 1 -9\nf 1 2 3\n";
+  write_file(folder / "open.obj", open_mesh);
+  write_file(folder / "nan.obj", "v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n");
+  write_file(folder / "nothing.obj", "v 0 0 0\n");
+  const auto mesh = [](const std::string& name) {
+    return "[[obstacle]]\nname = \"" + name + "\"\nmesh = \"" + name + ".obj\"\n";
+  };
+  const auto write = [&](const std::string& more) {
+    write_file(folder / "scene.toml", test::scene_text("[[pin]]\nat = \"curve:0,2\"\n", more));
+  };
+  write(mesh("open") + mesh("nan") + mesh("nothing") +
+        "[[contact_pair]]\na = \"cloth\"\nb = \"nan\"\nfriction = 0.7\n");
+  Outcome check = toile(folder, "check scene.toml");
+  EXPECT_EQ(check.code, 3);
+  EXPECT_EQ(count(check.err, "obstacle 'nan'"), 1) << check.err;
+  EXPECT_EQ(count(check.err, "obstacle 'nothing'"), 1) << check.err;
+  EXPECT_EQ(count(check.err, "the mesh is open"), 1) << check.err;
+  EXPECT_EQ(count(check.out, "panel 'cloth'"), 1) << "the panels are looked at too";
+  check = toile(folder, "check scene.toml --json");
+  EXPECT_EQ(check.code, 3);
+  auto verdict = nlohmann::json::parse(check.out);
+  EXPECT_EQ(verdict["valid"], false);
+  EXPECT_EQ(verdict["errors"].size(), 2u);
+  EXPECT_EQ(count(check.out, "the mesh is open"), 1) << check.out;
+
+  write(mesh("open"));
+  check = toile(folder, "check scene.toml");
+  EXPECT_EQ(check.code, 0) << check.err;
+  EXPECT_EQ(count(check.err, "the mesh is open"), 1) << check.err;
+  check = toile(folder, "check scene.toml --json");
+  verdict = nlohmann::json::parse(check.out);
+  EXPECT_EQ(verdict["valid"], true);
+  EXPECT_EQ(count(check.out, "the mesh is open"), 1) << check.out;
+}
+
+TEST(Program, ACheckAlwaysHasAVerdict) {
+  const Small folder("verdict");
+  const auto verdict = [&](const std::string& setting, int code) {
+    const Outcome check = toile(folder, "check scene.toml --json --set " + setting);
+    EXPECT_EQ(check.code, code) << check.err;
+    return nlohmann::json::parse(check.out);
+  };
+  auto good = verdict("solver.until=1", 0);
+  EXPECT_EQ(good["valid"], true);
+  EXPECT_TRUE(good["errors"].empty());
+  EXPECT_EQ(good["panels"][0]["name"], "cloth");
+  const auto reason = [](const nlohmann::json& bad) {
+    EXPECT_EQ(bad["valid"], false);
+    EXPECT_EQ(bad["errors"].size(), 1u);
+    return bad["errors"][0].get<std::string>();
+  };
+  EXPECT_NE(reason(verdict("panel.0.grian_deg=3", 3)).find("grian_deg"), std::string::npos);
+  EXPECT_NE(reason(verdict("pin.0.at=uv:1,1", 4)).find("uv:1,1"), std::string::npos);
+  const std::string side = "{panel=\"cloth\",curve=";
+  EXPECT_NE(reason(verdict("'seam=[{a=" + side + "0},b=" + side + "1}}]'", 3)).find("seams are not simulated"),
+            std::string::npos);
+}
+
 TEST(Program, DrapesAndReports) {
   const Small folder("drape");
   const Outcome run = toile(
