@@ -15,13 +15,14 @@ namespace toile {
 
 IgesBody read_iges_body(const std::filesystem::path& path, double chord_error) {
   const PanelFile file = read_panels(path);
+  require_panels(file);
   IgesBody out;
   out.metres_per_unit = file.metres_per_unit;
   out.warnings = file.warnings;
   for (const std::string& reason : file.refused) out.warnings.push_back("left out: " + reason);
   // A third for the faces; their borders may be twice that apart where they are joined, as each is off by a third, and
   // vertices that become one move by half of one.
-  const double third = chord_error / file.metres_per_unit / 3;
+  const double third = chord_error / file.metres_per_unit / 3, millimetres = 1000 * file.metres_per_unit;
   std::vector<Eigen::Vector3d> vertices;
   std::string first_reason;
   for (TrimmedSurface face : file.panels) {
@@ -29,9 +30,11 @@ IgesBody read_iges_body(const std::filesystem::path& path, double chord_error) {
       validate_loops(face);
       const FaceTriangles triangles = face_triangles(face, third);
       if (triangles.chord_error > third)
-        out.warnings.push_back(fmt::format("face '{}' ({}): its triangles are up to {:.3g} mm off, more than asked for",
-                                           face.name, face.source,
-                                           1000 * file.metres_per_unit * triangles.chord_error));
+        out.warnings.push_back(
+            fmt::format("face '{}' ({}): its triangles are up to {:.3g} mm off, as more of them than the {} there are "
+                        "would be too many; a chord_error of {:.3g} mm accepts that",
+                        face.name, face.source, millimetres * triangles.chord_error, triangles.mesh.triangles.size(),
+                        3 * millimetres * triangles.chord_error));
       const int first = static_cast<int>(vertices.size());
       for (Eigen::Index k = 0; k < triangles.mesh.vertices.cols(); ++k)
         vertices.emplace_back(triangles.mesh.vertices.col(k));
@@ -42,8 +45,7 @@ IgesBody read_iges_body(const std::filesystem::path& path, double chord_error) {
       out.warnings.push_back(fmt::format("a face is left out: {}", error.what()));
     }
   }
-  if (vertices.empty())
-    throw GeometryError(first_reason.empty() ? path.string() + ": holds no face and no surface" : first_reason);
+  if (vertices.empty()) throw GeometryError(first_reason);
   out.mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
   for (std::size_t k = 0; k < vertices.size(); ++k) out.mesh.vertices.col(static_cast<Eigen::Index>(k)) = vertices[k];
   out.mesh = join_borders(std::move(out.mesh), std::max(2 * third, 2 * file.resolution));

@@ -53,11 +53,14 @@ std::string held_twice(const Scene& scene, const std::vector<Candidate>& candida
     other = &scene.pins[static_cast<std::size_t>(candidates[l].pin)];
   }
   const std::string what =
-      other ? fmt::format("{}: {} and {} ({}), {:.3g} m away, hold the same control points", pin.where, pin.at.text,
-                          other->at.text, other->where, nearest)
-            : fmt::format("{}: {} is held by pins of control points already", pin.where, pin.at.text);
-  if (pin.move || (other && other->move)) throw InputError(what + " and one of them moves");
-  return what + "; the first one is left out";
+      other ? fmt::format("{}: pin {} and pin {} ({}), {:.3g} m away, hold the same control points", pin.where,
+                          pin.at.text, other->at.text, other->where, nearest)
+            : fmt::format("{}: the control points of pin {} are held by other pins already", pin.where, pin.at.text);
+  if (pin.move || (other && other->move))
+    throw InputError(what +
+                     ", and one of them moves; take one of them out, or make the cells smaller (refine), so that each "
+                     "holds control points of its own");
+  return what + fmt::format("; pin {} is left out", pin.at.text);
 }
 
 // A clamped edge of which some components are held: the control points beside it are held in the same ones. Where that
@@ -190,7 +193,10 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     const HeldPlace place = held_place(pin.at, pin.clamp, places, who);
     const int first = build.model->first_point(k);
     if (pin.partial() && pin.clamp && place.across.empty())
-      throw InputError(who + ": hold: clamp = true with some components held works at edges in this version");
+      throw InputError(
+          who +
+          ": clamp = true with a hold that leaves components free works at whole edges only (edge:u0, or a "
+          "curve that covers one); address an edge, leave clamp out, or leave hold out");
     int points = 0;
     const auto count = [&](int i) {
       mean[p] += start.col(i);
@@ -239,8 +245,10 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
       const ScenePin& a = scene.pins[static_cast<std::size_t>(fixed.back().pin)];
       const ScenePin& b = scene.pins[static_cast<std::size_t>(h.pin)];
       if (a.move || b.move) {
-        throw InputError(fmt::format("{}: pins {} ({}) and {} ({}) hold the same control point and one of them moves",
-                                     b.where, fixed.back().pin, a.at.text, h.pin, b.at.text));
+        throw InputError(
+            fmt::format("{}: pins {} ({}, {}) and {} ({}) hold the same control point, and one of them moves; take one "
+                        "of them out, or address places that don't meet",
+                        b.where, fixed.back().pin, a.at.text, a.where, h.pin, b.at.text));
       }
       continue;
     }
@@ -352,7 +360,10 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   }
   if (scene.rest && scene.rest->load_steps) {
     if (dynamic.loads.force.isZero(0))
-      throw InputError(scene.path.string() + ": load_steps in [solver] rest: the scene has no loads");
+      throw InputError(
+          scene.path.string() +
+          ": load_steps in [solver] rest: the scene has no loads that could grow; give it gravity in [load], "
+          "a [[traction]] or a [[force]], or leave load_steps out");
     system->path = std::make_unique<EquilibriumPath>(
         dynamic, PathOptions{.load_steps = *scene.rest->load_steps, .arc_length = scene.rest->arc_length});
   }

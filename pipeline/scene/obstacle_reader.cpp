@@ -199,8 +199,10 @@ void read_obstacles(Table& top, Scene& scene) {
     if (std::ranges::find(names, obstacle.name) != names.end())
       throw InputError(fmt::format("{}: a panel or another obstacle is called '{}'", obstacle.where, obstacle.name));
     if (!says_thickness && obstacle.thickness > 0)
-      scene.notes.push_back(fmt::format("obstacle '{}': the cloth keeps {} mm off its surface (thickness chooses)",
-                                        obstacle.name, 1000 * obstacle.thickness));
+      scene.notes.push_back(
+          fmt::format("{}: obstacle '{}': the cloth keeps {} mm off its surface; thickness in its [[obstacle]] sets "
+                      "another distance",
+                      obstacle.where, obstacle.name, 1000 * obstacle.thickness));
     scene.obstacles.push_back(std::move(obstacle));
   }
 }

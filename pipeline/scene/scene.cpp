@@ -278,21 +278,29 @@ Address address(Table& table, const std::string& key) {
   }
 }
 
+// 1 for each of x, y and z that is named; unset where something else is, or one twice, or nothing.
+std::optional<Eigen::Vector3d> held_components(const std::string& text) {
+  Eigen::Vector3d out = Eigen::Vector3d::Zero();
+  for (const char c : text) {
+    if (c < 'x' || c > 'z' || out[c - 'x'] != 0) return std::nullopt;
+    out[c - 'x'] = 1;
+  }
+  return text.empty() ? std::nullopt : std::optional(out);
+}
+
 ScenePin read_pin(Table table, const std::vector<ScenePanel>& panels) {
   ScenePin pin;
   pin.where = table.where();
   pin.panel = panel_key(table, panels);
   pin.at = address(table, "at");
   if (const auto hold = table.string("hold")) {
-    pin.hold.setZero();
-    for (const char c : *hold) {
-      if (c < 'x' || c > 'z' || pin.hold[c - 'x'] != 0) pin.hold.setConstant(std::numeric_limits<double>::quiet_NaN());
-      if (pin.hold.allFinite()) pin.hold[c - 'x'] = 1;
-    }
-    if (!pin.hold.allFinite() || hold->empty()) {
+    const auto components = held_components(*hold);
+    if (!components)
       table.fail(*table.raw().get("hold"),
-                 fmt::format("hold = \"{}\": expected the components that are held, such as \"xz\" or \"y\"", *hold));
-    }
+                 fmt::format("hold = \"{}\": expected the components that are held, each once, such as \"xz\" or \"y\"; "
+                             "leave hold out to hold all",
+                             *hold));
+    pin.hold = *components;
   }
   pin.clamp = table.boolean("clamp").value_or(false);
   if (auto move = table.table("move", "move")) pin.move = read_motion(*move);
