@@ -200,7 +200,7 @@ class Run::Impl {
     if (result_.control.bound_is_due()) evaluate_bound();
     double largest = result_.control.scale * largest_step();
     if (!scene_.dt && !equilibrating()) largest *= result_.relaxation.dt_share;
-    if (!scene_.dt && result_.state.t < pins_done_) largest = held_to_pins(largest);
+    if (!scene_.dt && result_.state.t < motion_done_) largest = held_to_pins(largest);
     const double left = target - result_.state.t;
     // A remainder of rounding makes no step of its own.
     const double count = std::max(1.0, std::ceil(left / largest * (1 - 1e-9)));
@@ -311,7 +311,7 @@ class Run::Impl {
       result_.watch.balance -= report.at_end ? report.kinetic_end : report.kinetic;
       result_.watch.trough = result_.watch.balance;
     }
-    if (result_.state.t < pins_done_) restart(relaxation);
+    if (result_.state.t < motion_done_) restart(relaxation);
   }
   std::string unrest() const {
     if (result_.system->path && result_.path.factor != 1)
@@ -469,7 +469,7 @@ class Run::Impl {
   std::unique_ptr<System> start_system_;  // null: begin() assembles it
   RunResult result_;
   const double tolerance_ = rest_tolerance(build_);
-  const double pins_done_ = pins_done(scene_);
+  const double motion_done_ = motion_done(scene_);
   const double span_ = longest_span(build_);
   bool begun_ = false, over_ = false;
   StepWork work_;

@@ -23,7 +23,7 @@ std::optional<double> Schedule::next_target() const {
   return next;
 }
 
-double pins_done(const Scene& scene) {
+double motion_done(const Scene& scene) {
   double t = 0;
   for (const ScenePin& pin : scene.pins) {
     if (pin.move) t = std::max(t, pin.release ? std::min(*pin.release, pin.move->end) : pin.move->end);

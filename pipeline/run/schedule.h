@@ -24,8 +24,8 @@ struct Schedule {
   bool open(double time) const { return time > done && time >= t; }
 };
 
-// When pins no longer move and are no longer let go [s].
-double pins_done(const Scene& scene);
+// When pins and obstacles no longer move and pins are no longer let go [s].
+double motion_done(const Scene& scene);
 
 // All frames of a scene with an end.
 std::vector<double> frame_times(const Scene& scene);

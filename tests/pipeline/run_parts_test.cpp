@@ -39,7 +39,7 @@ TEST(Schedule, StepsLandOnFramesAndReleasesAndOnTheEndLast) {
   scene.pins[1].release = 0.75;
   EXPECT_EQ(targets(scene), (std::vector<double>{0, 0.375, 0.5, 0.75, 1}));
   EXPECT_EQ((Schedule{scene, 0.4, 0.375}.next_frame()), 0.75);
-  EXPECT_EQ(pins_done(scene), 0.75);
+  EXPECT_EQ(motion_done(scene), 0.75);
   scene.pins[1].release = 2;  // after the end
   EXPECT_EQ(targets(scene), (std::vector<double>{0, 0.375, 0.5, 0.75, 1}));
 }
