@@ -25,7 +25,7 @@ struct Fabric {
     double coupling = 0;      // N m, of weft's moment on warp's curvature and the other way
   } bending;
   double drag = 0.351;    // kg/(m2 s), force per area against the velocity relative to the wind
-  double friction = 0.3;  // Coulomb's, of contact
+  double friction = 0.3;  // of cloth on cloth
   RestCurvature rest_curvature = RestCurvature::panel;
 };
 

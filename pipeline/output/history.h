@@ -14,8 +14,9 @@ namespace toile {
 
 // Columns, SI: frame (last one shown), step, t, dt (of the last step); energies by the names of report.json
 // [J]; largest and least strain, weft and warp, over the grid of report.json; iterations of the last step's
-// projection, and of all steps; steps redone so far; contacts (empty: nothing touches in this version);
-// reaction_K_x, _y, _z: force of pin K on the cloth [N]; point_K_x, _y, _z: the scene's output points [m].
+// projection, and of all steps; steps redone so far; contacts of the last step (empty where the scene
+// has nothing to touch); reaction_K_x, _y, _z: force of pin K on the cloth [N]; point_K_x, _y, _z: the scene's output
+// points [m].
 //   (1) a row is whole before it is followed by another or by a checkpoint;
 //   (2) a run that was taken up has the bytes of one that was never stopped, if it had the history so far.
 class History {
