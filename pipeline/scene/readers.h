@@ -23,5 +23,8 @@ PinMotion read_motion(Table& move);
 void read_obstacles(Table& top, Scene& scene);
 void read_contact_pairs(Table& top, Scene& scene);
 void read_contact(Table& table, SceneContact& contact);
+// [strain_limit] and, once that is read, [solver].
+void read_limit(Table table, Scene& scene);
+void read_solver(Table table, Scene& scene);
 
 }  // namespace toile
