@@ -92,8 +92,8 @@ TEST(Program, ACheckSaysEveryFaultAndWarningOfObstaclesOnce) {
         "[[contact_pair]]\na = \"cloth\"\nb = \"nan\"\nfriction = 0.7\n");
   Outcome check = toile(folder, "check scene.toml");
   EXPECT_EQ(check.code, 3);
-  EXPECT_EQ(count(check.err, "obstacle 'nan'"), 1) << check.err;
-  EXPECT_EQ(count(check.err, "obstacle 'nothing'"), 1) << check.err;
+  EXPECT_EQ(count(check.err, "obstacle 'nan': nan.obj"), 1) << check.err;
+  EXPECT_EQ(count(check.err, "obstacle 'nothing': nothing.obj"), 1) << check.err;
   EXPECT_EQ(count(check.err, "the mesh is open"), 1) << check.err;
   EXPECT_EQ(count(check.out, "panel 'cloth'"), 1) << "the panels are looked at too";
   check = toile(folder, "check scene.toml --json");
