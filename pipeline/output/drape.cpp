@@ -385,13 +385,13 @@ SceneCheck check(const std::function<Scene()>& read) {
     out.errors.push_back(why);
     if (out.code == exit_ok) out.code = code;
   };
+  std::vector<std::string> refused;
   try {
     Scene scene = read();
     out.scene = scene.name;
     out.path = scene.path.string();
     out.notes = scene.notes;
-    // What `drape` refuses isn't valid.
-    for (const std::string& reason : not_simulated(scene)) fail(reason, exit_input);
+    refused = not_simulated(scene);
     BuiltObstacles obstacles = build_obstacles(scene);
     out.obstacles = obstacles.about;
     add(out.warnings, obstacles.warnings);
@@ -407,6 +407,8 @@ SceneCheck check(const std::function<Scene()>& read) {
   } catch (const GeometryError& error) {
     fail(error.what(), exit_geometry);
   }
+  // What `drape` refuses isn't valid, though it can be built.
+  for (const std::string& reason : refused) fail(reason, exit_input);
   return out;
 }
 
