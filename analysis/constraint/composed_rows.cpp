@@ -92,7 +92,7 @@ Eigen::VectorXd gram_diagonal(const AffineMap& map, const ConstraintRows& rows, 
   const auto strains = static_cast<Eigen::Index>(rows.strain.size());
   for (std::size_t p = 0; p < rows.place.size(); ++p)
     if (!(out[strains + static_cast<Eigen::Index>(p)] > 0))
-      throw SolverError("pin " + std::to_string(rows.place[p].pin) +
+      throw SolverError(name(rows.place[p]) +
                         " holds a point whose control points are all fixed by other pins: remove one of them");
   return out;
 }

@@ -32,10 +32,14 @@ ScalarRow make_row(const MaterialPoint& point, int which) {
 
 }  // namespace
 
+std::string name(const PlaceRow& row) {
+  return row.seam >= 0 ? "seam " + std::to_string(row.seam) : "pin " + std::to_string(row.pin);
+}
+
 void require_whole_places(const ConstraintRows& rows, const std::string& remedy) {
   for (const PlaceRow& row : rows.place)
     if (row.axes != Eigen::Vector3d::Ones())
-      throw SolverError("pin " + std::to_string(row.pin) + " holds some components only (hold): " + remedy);
+      throw SolverError(name(row) + " holds some components only (hold): " + remedy);
 }
 
 std::vector<StrainRow> strain_rows(const Body& body, const AffineMap& map,

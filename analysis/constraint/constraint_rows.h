@@ -15,7 +15,8 @@ namespace toile {
 
 // Each has a row d over the body's points, which gives the vector y = sum_I d_I q_I.
 //   strain rows: d = N_,weft or N_,warp at a constraint point; C = (y.y - 1) / 2                 [eq. 36]
-//   place rows:  d = N at a pinned material point; C = y - target(t), three components or some, always an equality.
+//   place rows:  d = N at a pinned material point; C = y - target(t), three components or some, always an equality;
+//                of a seam the difference of N at two points that are sewn to each other.
 struct StrainRow {
   ScalarRow row;
   int panel = 0;
@@ -31,7 +32,9 @@ struct PlaceRow {
   int pin = 0;                                    // of the scene, for reactions and messages
   std::function<Eigen::Vector3d(double)> target;  // place at time t [m]
   Eigen::Vector3d axes{1, 1, 1};                  // 1: held, 0: free
+  int seam = -1;                                  // of the scene, instead of a pin; -1: none
 };
+std::string name(const PlaceRow& row);  // "pin 3", "seam 0"
 
 struct ConstraintRows {
   std::vector<StrainRow> strain;

@@ -67,7 +67,7 @@ void check_places(const AffineMap& map, const std::vector<PlaceRow>& place) {
     } else if (!(left.norm() * size[p] <= contradiction)) {
       Eigen::Index other = 0;
       link.cwiseAbs().maxCoeff(&other);
-      throw SolverError("pins " + std::to_string(place[taken[other]].pin) + " and " + std::to_string(place[p].pin) +
+      throw SolverError(name(place[taken[other]]) + " and " + name(place[p]) +
                         " hold the same material at different places");
     }
   }

@@ -101,7 +101,7 @@ ContactSearch::ContactSearch(const ContactProxy& proxy, const Body& body, std::v
   if (!options_.self) return;
   Matrix3Xd rest(3, proxy.vertices());
   for (int v = 0; v < proxy.vertices(); ++v) rest.col(v) = apply(proxy.points(v), body.rest());
-  self_.emplace(proxy, std::move(rest), options_.largest_chord);
+  self_.emplace(proxy, std::move(rest), options_.largest_chord, options_.charts);
 }
 
 double ContactSearch::friction(int panel, int obstacle) const {

@@ -24,6 +24,7 @@ struct ContactSearchOptions {
   bool self = false;                        // the cloth meets itself
   Eigen::MatrixXd friction = {};            // panels x obstacles; empty: the obstacles' own
   Eigen::MatrixXd friction_of_panels = {};  // panels x panels; empty: the mean of two panels' own
+  std::vector<SewnChart> charts = {};       // around seams
 };
 
 // The places of a step: of fixed control points and of the proxy's vertices, at its start and in its candidate.

@@ -13,9 +13,11 @@ namespace toile {
 namespace {
 
 using Eigen::Matrix3Xd;
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double beyond = 0.05;  // of an edge or triangle: so far outside of it something may pass through it
+constexpr double sewn_offsets = 3;  // from a seam, that its two sides may be nearer than cloth
+constexpr double beyond = 0.05;     // of an edge or triangle: so far outside of it something may pass through it
 
 bool inside(double share, double slack) {
   return share >= -slack && share <= 1 + slack;
@@ -23,8 +25,15 @@ bool inside(double share, double slack) {
 
 }  // namespace
 
-SelfSearch::SelfSearch(const ContactProxy& proxy, Matrix3Xd rest, double largest_chord)
-    : proxy_(proxy), rest_(std::move(rest)), largest_chord_(largest_chord) {
+SelfSearch::SelfSearch(const ContactProxy& proxy, Matrix3Xd rest, double largest_chord,
+                       const std::vector<SewnChart>& charts)
+    : proxy_(proxy),
+      rest_(std::move(rest)),
+      largest_chord_(largest_chord),
+      charts_(charts.empty() ? 0 : static_cast<std::size_t>(proxy.vertices())) {
+  for (std::size_t c = 0; c < charts.size(); ++c)
+    for (const auto& [vertex, place] : charts[c].places)
+      charts_[static_cast<std::size_t>(vertex)].push_back({static_cast<int>(c), place});
   std::map<std::pair<int, int>, int> number;  // of panel and knot cell
   std::vector<int> cell_of_vertex(static_cast<std::size_t>(proxy.vertices()), -1);
   std::vector<std::vector<int>> around(static_cast<std::size_t>(proxy.vertices()));  // cells
@@ -215,6 +224,24 @@ void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMe
   }
 }
 
+// Whether its two places are so near each other in a chart.
+bool SelfSearch::sewn(const SelfMeeting& meeting, double within) const {
+  if (charts_.empty()) return false;
+  const auto of = [&](int vertex) -> const std::vector<OnChart>& { return charts_[static_cast<std::size_t>(vertex)]; };
+  for (const OnChart& on : of(meeting.vertices.front().first)) {
+    Vector2d apart = Vector2d::Zero();
+    const bool all = std::ranges::all_of(meeting.vertices, [&](const auto& entry) {
+      const auto& list = of(entry.first);
+      const auto there = std::ranges::find(list, on.chart, &OnChart::chart);
+      if (there == list.end()) return false;
+      apart += entry.second * there->place;
+      return true;
+    });
+    if (all && apart.lpNorm<1>() < within) return true;
+  }
+  return false;
+}
+
 // With its thickness and chord errors, if that may be touched.
 void SelfSearch::add(const Moved& m, SelfMeeting meeting, std::vector<SelfMeeting>& out) const {
   const std::size_t of_first = meeting.edges ? 2 : 1;  // entries of `vertices`
@@ -241,7 +268,7 @@ void SelfSearch::add(const Moved& m, SelfMeeting meeting, std::vector<SelfMeetin
   meeting.distance = meeting.normal.dot(before);
   const double offset = meeting.thickness + meeting.chord;
   const bool one_panel = proxy_.panel(meeting.vertices.front().first) == proxy_.panel(meeting.vertices.back().first);
-  if (gap > offset + m.margin || (one_panel && rest.norm() < offset)) return;
+  if (gap > offset + m.margin || (one_panel && rest.norm() < offset) || sewn(meeting, sewn_offsets * offset)) return;
   out.push_back(std::move(meeting));
 }
 

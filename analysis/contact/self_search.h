@@ -24,15 +24,23 @@ struct SelfMeeting {
   double distance = 0;              // m along the normal, at the start
 };
 
+// Cloth around a seam, laid out flat: both sides with the seam between them. Distances are measured along it and from
+// it, |dx| + |dy|.
+struct SewnChart {
+  std::vector<std::pair<int, Eigen::Vector2d>> places;  // proxy vertex, m; ascending
+};
+
 //   (1) found is what comes within offset + margin, and what passes through: where the two are in one plane, with
 //       heights that change in proportion to time [after Provot 1997, whose cubic is exact also where planes turn];
-//   (2) places of one panel that are within an offset of each other at rest don't meet;
+//   (2) places of one panel that are within an offset of each other at rest don't meet, nor those that are within three
+//       in a chart: sewn cloth folds at its seam;
 //   (3) neighbouring cells whose triangles face within a right angle of each other don't meet [Volino &
 //       Magnenat-Thalmann 1994]: flat cloth costs a box and a cone of normals a cell.
 class SelfSearch {
  public:
   // `largest_chord`: of the chord errors that count [m].
-  SelfSearch(const ContactProxy& proxy, Eigen::Matrix3Xd rest, double largest_chord);
+  SelfSearch(const ContactProxy& proxy, Eigen::Matrix3Xd rest, double largest_chord,
+             const std::vector<SewnChart>& charts = {});
   // Between the places `from` and `at` of the vertices; in an order that the proxy alone decides.
   std::vector<SelfMeeting> find(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& at, double margin);
 
@@ -55,10 +63,16 @@ class SelfSearch {
   void edges_to_edges(const Moved& moved, int a, int b, std::vector<SelfMeeting>& out) const;
   void add(const Moved& moved, SelfMeeting meeting, std::vector<SelfMeeting>& out) const;
   bool neighbours(int a, int b) const;
+  bool sewn(const SelfMeeting& meeting, double within) const;
 
   const ContactProxy& proxy_;
   Eigen::Matrix3Xd rest_;
   double largest_chord_, thickest_ = 0;
+  struct OnChart {
+    int chart;
+    Eigen::Vector2d place;
+  };
+  std::vector<std::vector<OnChart>> charts_;  // per vertex, ascending
   std::vector<Cell> cells_;
   std::vector<std::vector<int>> beside_;  // per cell those that share a vertex with it, itself too; ascending
   BoundsTree tree_;

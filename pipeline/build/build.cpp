@@ -403,24 +403,11 @@ Build build(Scene scene, std::optional<std::vector<std::unique_ptr<Obstacle>>> o
     for (std::size_t i = 0; i < row.index.size(); ++i)
       loads.force.segment<3>(3 * row.index[i]) += row.value[i] * load.force;
   }
-  for (const SceneSeam& seam : result.scene.seams) {
-    for (const SeamSide& side : {seam.a, seam.b}) {
-      const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(side.panel))];
-      for (const int curve : side.curves) {
-        const bool there = std::ranges::any_of(panel.face.loops, [&](const TrimLoop& loop) {
-          return loop.index == side.loop &&
-                 std::ranges::find(loop.curves, curve, &TrimCurve::index) != loop.curves.end();
-        });
-        if (!there) {
-          throw GeometryError(
-              fmt::format("{}: [[seam]]: panel '{}' has no curve {},{}", seam.where, side.panel, side.loop, curve));
-        }
-      }
-    }
-  }
+  result.seams = build_seams(result, result.warnings);
   if (touches(result.scene)) {
     result.obstacles = obstacles ? std::move(*obstacles) : obstacles_of(result);
     result.proxies = contact_proxies(result, result.warnings, result.notes);
+    if (result.scene.contact.self) result.charts = sewn_charts(result);
   }
   for (const OutputPoint& point : result.scene.points) {
     const BuiltPanel& panel = result.panels[static_cast<std::size_t>(result.panel(point.panel))];

@@ -17,6 +17,7 @@
 #include "analysis/scheme/verlet.h"
 #include "geometry/trimmed_surface.h"
 #include "io/iges.h"
+#include "pipeline/build/seams.h"
 #include "pipeline/build/trace_panel.h"
 #include "pipeline/scene/scene.h"
 
@@ -47,6 +48,8 @@ struct Build {
   Loads loads;
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in the scene's order; moved by the run
   std::vector<ProxyPanel> proxies;                   // per panel; empty where nothing touches
+  std::vector<BuiltSeam> seams;                      // in the scene's order
+  std::vector<SewnChart> charts;                     // of the seams, where the cloth meets itself
   std::vector<std::string> warnings;
   std::vector<std::string> notes;  // decisions that say nothing against the scene or its files
   double read_seconds = 0, trim_seconds = 0;

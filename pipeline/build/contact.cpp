@@ -84,7 +84,7 @@ std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::str
   return out;
 }
 
-std::unique_ptr<ContactProjection> with_contact(const Build& build, const AffineMap& map,
+std::unique_ptr<ContactProjection> with_contact(const Build& build, bool sewn, const AffineMap& map,
                                                 const Eigen::VectorXd& node_mass, const Eigen::VectorXd& node_drag,
                                                 std::unique_ptr<ConstraintSolver> inner) {
   const Scene& scene = build.scene;
@@ -95,6 +95,11 @@ std::unique_ptr<ContactProjection> with_contact(const Build& build, const Affine
   options.search.self = scene.contact.self;
   options.search.largest_chord = 2 * scene.contact.chord;
   set_friction(build, options.search);
+  if (!sewn && !scene.sewing.friction) {
+    options.search.friction.setZero();
+    options.search.friction_of_panels.setZero();
+  }
+  options.search.charts = build.charts;
   return std::make_unique<ContactProjection>(*build.model, map, node_mass, node_drag, build.proxies, build.obstacles,
                                              std::move(inner), options);
 }

@@ -15,8 +15,9 @@ namespace toile {
 std::vector<ProxyPanel> contact_proxies(const Build& build, std::vector<std::string>& warnings,
                                         std::vector<std::string>& notes);
 
-// `inner`: the other constraints, null for none. The result refers to `build` and `map`, which must outlive it.
-std::unique_ptr<ContactProjection> with_contact(const Build& build, const AffineMap& map,
+// `sewn`: the seams are closed; before that without friction, unless the scene wants it. `inner`: the other
+// constraints, null for none. The result refers to `build` and `map`, which must outlive it.
+std::unique_ptr<ContactProjection> with_contact(const Build& build, bool sewn, const AffineMap& map,
                                                 const Eigen::VectorXd& node_mass, const Eigen::VectorXd& node_drag,
                                                 std::unique_ptr<ConstraintSolver> inner);
 

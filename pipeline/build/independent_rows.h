@@ -16,6 +16,8 @@ struct Candidate {
   bool required = false;          // more than one of several along a curve
   Eigen::Vector3d axes{1, 1, 1};  // 1: component held, 0: free
   bool difference = false;        // of places: kept, not moved
+  int seam = -1;                  // whose `point` it is, instead of a pin; -1: none
+  int point = 0;
 };
 
 // Which candidates are independent of the fixed control points and of those taken before them, in the order given but

@@ -14,6 +14,12 @@
 
 namespace toile {
 
+// The part of a piece that an address names, as fractions of the piece's length.
+struct PathPart {
+  CurveOnSurface path;
+  double from = 0, to = 1;
+};
+
 CurveOnSurface::CurveOnSurface(const TrimmedSurface& face, const TrimTopology& topology, int loop, int curve,
                                const NurbsSurface& surface)
     : curve_(face.loops[static_cast<std::size_t>(loop)].curves[static_cast<std::size_t>(curve)].curve),
@@ -67,6 +73,12 @@ double CurveOnSurface::parameter(double fraction) const {
   const auto gap = [&](double t) {
     return sum_[k - 1] + gauss8([&](double s) { return speed(s); }, t_[k - 1], t) - wanted;
   };
+  // Newton's method for the bounds, halves down to neighbouring numbers.
+  double near = low + (wanted - sum_[k - 1]) / (sum_[k] - sum_[k - 1]) * (high - low);
+  for (int step = 0; step < 4 && near > low && near < high; ++step) near -= gap(near) / speed(near);
+  const double around = 1e-9 * (high - low);
+  for (const double t : {near - around, near + around})
+    if (t > low && t < high) (gap(t) < 0 ? low : high) = t;
   while (true) {
     const double middle = low + (high - low) / 2;
     if (middle <= low || middle >= high) return middle;
@@ -161,12 +173,6 @@ std::vector<CurvePosition> find_curve(const Address& at, const PanelPlaces& pane
   std::ranges::stable_sort(pieces, {}, [&](const CurvePosition& p) { return curve_at(p).curve.domain().min; });
   return pieces;
 }
-
-// The part of a piece that an address names, as fractions of the piece's length.
-struct PathPart {
-  CurveOnSurface path;
-  double from = 0, to = 1;
-};
 
 std::vector<PathPart> path_of(const Address& at, const std::vector<CurvePosition>& pieces, const PanelPlaces& panel) {
   std::vector<PathPart> parts;
@@ -321,6 +327,56 @@ Eigen::Vector2d point_uv(const Address& at, const NurbsSurface& surface) {
   if (at.kind == Address::Kind::uv) return at.uv;
   const Interval u = surface.u().domain(), v = surface.v().domain();
   return {at.a == 0 ? u.min : u.max, at.b == 0 ? v.min : v.max};
+}
+
+CurveChain::CurveChain(int loop, std::span<const int> curves, double from, double to, const PanelPlaces& panel,
+                       const std::string& who) {
+  std::vector<PathPart> whole;
+  std::vector<double> at{0};      // m, where parts end
+  std::vector<std::size_t> last;  // parts that end a curve
+  for (const int curve : curves) {
+    Address address;
+    address.kind = Address::Kind::curve;
+    address.a = loop, address.b = curve;
+    for (PathPart& part : path_of(address, find_curve(address, panel, who), panel)) {
+      at.push_back(at.back() + part.path.length());
+      whole.push_back(std::move(part));
+    }
+    last.push_back(whole.size() - 1);
+  }
+  const double start = from * at.back(), end = to * at.back();
+  length_ = end - start;
+  for (std::size_t k = 0; k < whole.size(); ++k) {
+    PathPart& part = whole[k];
+    const double own = part.path.length();
+    part.from = std::max(0.0, (start - at[k]) / own);
+    part.to = std::min(1.0, (end - at[k]) / own);
+    if (!(part.from < part.to)) continue;
+    before_.push_back(std::max(0.0, at[k] - start));
+    parts_.push_back(std::move(part));
+    const double fraction = (at[k + 1] - start) / length_;
+    if (fraction < 1 - 1e-9 && std::ranges::find(last, k) != last.end()) ends_.push_back(fraction);
+  }
+}
+CurveChain::~CurveChain() = default;
+
+CurveChain::Place CurveChain::place(double fraction) const {
+  const double wanted = fraction * length_;
+  const auto above = std::ranges::upper_bound(before_, wanted);
+  const auto k = static_cast<std::size_t>(std::max<std::ptrdiff_t>(above - before_.begin(), 1) - 1);
+  const PathPart& part = parts_[k];
+  const double own = std::clamp(part.from + (wanted - before_[k]) / part.path.length(), part.from, part.to);
+  return {&part, part.path.parameter(own)};
+}
+
+Eigen::Vector2d CurveChain::at(double fraction) const {
+  const Place there = place(fraction);
+  return there.part->path.uv(there.t);
+}
+
+double CurveChain::cells_per_metre(double fraction) const {
+  const Place there = place(fraction);
+  return there.part->path.cells(there.t) / there.part->path.speed(there.t);
 }
 
 HeldPlace held_place(const Address& at, bool clamp, const PanelPlaces& panel, const std::string& who) {

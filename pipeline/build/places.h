@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,36 @@ class CurveOnSurface {
   const Curve2& curve_;
   const NurbsSurface& surface_;
   std::vector<double> t_, sum_;  // piece ends and the length up to each
+};
+
+struct PanelPlaces;
+struct PathPart;
+
+// Trim curves of a panel one after the other, by fractions of their length in space.
+class CurveChain {
+ public:
+  // `curves`: the file's numbers in the file's loop, each run in the file's direction; of the whole the part from one
+  // fraction of its length to another. Throws GeometryError where a curve doesn't exist.
+  CurveChain(int loop, std::span<const int> curves, double from, double to, const PanelPlaces& panel,
+             const std::string& who);
+  ~CurveChain();
+
+  double length() const { return length_; }                  // m
+  Eigen::Vector2d at(double fraction) const;                 // parameters
+  double cells_per_metre(double fraction) const;             // where spans of the knots count 1
+  const std::vector<double>& ends() const { return ends_; }  // fractions where curves end, 0 and 1 left out
+
+ private:
+  struct Place {
+    const PathPart* part;
+    double t;
+  };
+  Place place(double fraction) const;
+
+  std::vector<PathPart> parts_;
+  std::vector<double> before_;  // m, up to each part
+  std::vector<double> ends_;
+  double length_ = 0;
 };
 
 // Points on a curve or edge with their share of its length: integrates a line load.

@@ -48,7 +48,8 @@ std::string held_twice(const Scene& scene, const std::vector<Candidate>& candida
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t l = 0; l < candidates.size(); ++l) {
     const double distance = (apply(candidates[l].row, start) - at).norm();
-    if (taken[l].isZero() || candidates[l].pin == candidates[k].pin || !(distance < nearest)) continue;
+    if (taken[l].isZero() || candidates[l].seam >= 0 || candidates[l].pin == candidates[k].pin || !(distance < nearest))
+      continue;
     nearest = distance;
     other = &scene.pins[static_cast<std::size_t>(candidates[l].pin)];
   }
@@ -168,10 +169,11 @@ StepReport step(const System& system, DynamicState& state, double dt, StepWork& 
   return system.implicit ? system.implicit->step(state, dt, work) : step(system.dynamic, state, dt, work);
 }
 
-std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers) {
+std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers, const Sewing* sewing) {
   const Scene& scene = build.scene;
   require_solver_of_components(scene);
   auto system = std::make_unique<System>();
+  *system->sewing = sewing ? *sewing : open_seams(scene, build.seams);
 
   // What each pin holds.
   struct Held {
@@ -279,6 +281,9 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
   if (build.model->point_count() >= least_control_points_for_threads) dynamic.workers = workers;
   dynamic.map = system->map.get();
   dynamic.loads = build.loads;
+  if (!system->sewing->done && !scene.sewing.gravity)
+    for (int i = 0; i < build.model->point_count(); ++i)
+      dynamic.loads.force.segment<3>(3 * i) -= build.model->lumped_mass()[i] * scene.gravity;
   dynamic.node_mass = system->map->reduce_scalar(build.model->lumped_mass());
   dynamic.node_drag = system->map->reduce_scalar(build.model->lumped_drag());
   const auto& nodes = system->map->node_control_point();
@@ -289,10 +294,34 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     drag = scene.rest ? 0 : std::max(drag, 0.0);
   }
 
+  // After the pins: where they hold both sides of a seam, it holds nothing.
+  for (std::size_t s = 0; s < build.seams.size(); ++s) {
+    const BuiltSeam& seam = build.seams[s];
+    for (std::size_t k = 0; k < seam.rows.size(); ++k) {
+      candidates.push_back({.row = seam.rows[k].row,
+                            .pin = -1,
+                            .required = k < seam.required,
+                            .seam = static_cast<int>(s),
+                            .point = static_cast<int>(k)});
+    }
+  }
+  const auto closing = [&build, clock = system->sewing](const ScalarRow& row, int seam) {
+    return [gap = Eigen::Vector3d(apply(row, build.start)), clock, seam](double time) -> Eigen::Vector3d {
+      return open_part(clock->progress_at(seam, time)) * gap;
+    };
+  };
+
   ConstraintRows rows;
   const std::vector<Eigen::Vector3d> taken = independent_axes(candidates, *system->map, dynamic.node_mass);
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     Candidate& c = candidates[k];
+    if (c.seam >= 0) {
+      if (taken[k].isZero()) continue;
+      rows.place.push_back({c.row, -1, closing(c.row, c.seam), taken[k], c.seam});
+      system->place_pin.push_back(-1);
+      system->place_seam.push_back({c.seam, c.point});
+      continue;
+    }
     const Eigen::Vector3d from = apply(c.row, build.start);
     const bool point = scene.pins[static_cast<std::size_t>(c.pin)].at.kind == Address::Kind::uv;
     if (taken[k] != c.axes && point) system->warnings.push_back(held_twice(scene, candidates, taken, k, build.start));
@@ -304,7 +333,12 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     else
       rows.place.back().target = [moved, pin, from](double time) { return moved(pin, from, time); };
     system->place_pin.push_back(pin);
+    system->place_seam.push_back({-1, -1});
   }
+  for (std::size_t s = 0; s < build.seams.size(); ++s)
+    for (const SeamPlace& place : build.seams[s].along)
+      system->along_seams.push_back(
+          {place.row, -1, closing(place.row, static_cast<int>(s)), {1, 1, 1}, static_cast<int>(s)});
   for (PlaceRow& place : along_curves) {
     const Eigen::Vector3d from = apply(place.row, build.start);
     place.target = [moved, pin = place.pin, from](double time) { return moved(pin, from, time); };
@@ -345,8 +379,8 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers)
     system->projection->use_threads(dynamic.workers);
   }
   if (touches(scene)) {
-    auto contact =
-        with_contact(build, *system->map, dynamic.node_mass, dynamic.node_drag, std::move(system->projection));
+    auto contact = with_contact(build, system->sewing->done, *system->map, dynamic.node_mass, dynamic.node_drag,
+                                std::move(system->projection));
     contact->use_threads(dynamic.workers);
     system->contact = contact.get();
     system->projection = std::move(contact);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,9 +27,12 @@ struct System {
   std::vector<std::vector<ConstraintPoint>> points, extra_points;
   std::vector<std::string> warnings;                          // pins that hold what others hold
   int strain_rows = 0, place_rows = 0, place_components = 0;  // components that place rows hold
-  std::optional<Eigen::Vector2d> unbalanced;  // unbalanced_part() of the strain rows, where they are of points
-  std::vector<int> place_pin;                 // pin of each place row
-  std::vector<PlaceRow> along_curves;         // 200 places along each curve that a pin holds by some of its points
+  std::optional<Eigen::Vector2d> unbalanced;   // unbalanced_part() of the strain rows, where they are of points
+  std::vector<int> place_pin;                  // pin of each place row; -1: it is of a seam
+  std::vector<std::array<int, 2>> place_seam;  // of each place row: seam and which of its rows; -1: it is of a pin
+  std::vector<PlaceRow> along_seams;           // places along each seam, closely
+  std::shared_ptr<Sewing> sewing = std::make_shared<Sewing>();  // how far they are closed; the run sets it
+  std::vector<PlaceRow> along_curves;  // 200 places along each curve that a pin holds by some of its points
   std::unique_ptr<AffineMap> map;
   std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
   const ContactProjection* contact = nullptr;    // the same, where anything may touch
@@ -51,7 +55,10 @@ double default_limit_stiffness(const Build& build, int panel);
 // Pins released at or before t are left out. Throws InputError where two pins hold one control point and move apart,
 // or farther than the cloth between them reaches, GeometryError for places that don't exist, SolverError where place
 // rows contradict each other. `workers`: threads of the steps, which must outlive the system; null: the caller's alone.
-std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers = nullptr);
+// `sewing`: how far seams are closed; null: as at the start. Until they are done there is no gravity and no friction,
+// unless the scene wants them.
+std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers = nullptr,
+                                 const Sewing* sewing = nullptr);
 
 // How far the control points and places that pins move go from t to t + dt at most [m]. `now`, `then`: working memory.
 double pins_move(const System& system, double t, double dt, Eigen::Matrix3Xd& now, Eigen::Matrix3Xd& then);

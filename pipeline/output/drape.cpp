@@ -69,21 +69,6 @@ std::map<std::string, int> unused(const System& system) {
   return reasons;
 }
 
-// What the scene names and no part of this version simulates: a drape without it would be another one, so it is
-// refused.
-std::vector<std::string> not_simulated(const Scene& scene) {
-  if (scene.seams.empty()) return {};
-  return {
-      fmt::format("{}: seams are not simulated by this version; drape without the {} [[seam]] table{} with "
-                  "--set 'seam=[]'",
-                  scene.seams.front().where, scene.seams.size(), scene.seams.size() == 1 ? "" : "s")};
-}
-
-void refuse_not_simulated(const Scene& scene) {
-  const std::vector<std::string> reasons = not_simulated(scene);
-  if (!reasons.empty()) throw InputError(fmt::format("{}", fmt::join(reasons, "\n")));
-}
-
 // "42 s", "3 min", "2.5 h".
 std::string duration(double seconds) {
   if (seconds < 100) return fmt::format("{:.0f} s", seconds);
@@ -232,7 +217,6 @@ void warn_of_end(const Build& built, RunResult& result, const StateMeasures& mea
 
 int drape(Scene scene, const DrapeOptions& options, Console& console) {
   const Clock::time_point called = Clock::now();
-  refuse_not_simulated(scene);
   const std::filesystem::path directory = options.directory.value_or(std::filesystem::path("out") / scene.name);
   const Build built = build(std::move(scene));
   std::optional<Workers> threads;
@@ -285,7 +269,6 @@ int drape(Scene scene, const DrapeOptions& options, Console& console) {
 }
 
 int dry_run(Scene scene, bool json, Console& console) {
-  refuse_not_simulated(scene);
   const Build built = build(std::move(scene));
   for (const std::string& warning : built.warnings) console.warning(warning);
   for (const std::string& note : built.scene.notes) console.note(note);
@@ -385,13 +368,11 @@ SceneCheck check(const std::function<Scene()>& read) {
     out.errors.push_back(why);
     if (out.code == exit_ok) out.code = code;
   };
-  std::vector<std::string> refused;
   try {
     Scene scene = read();
     out.scene = scene.name;
     out.path = scene.path.string();
     out.notes = scene.notes;
-    refused = not_simulated(scene);
     BuiltObstacles obstacles = build_obstacles(scene);
     out.obstacles = obstacles.about;
     add(out.warnings, obstacles.warnings);
@@ -407,8 +388,6 @@ SceneCheck check(const std::function<Scene()>& read) {
   } catch (const GeometryError& error) {
     fail(error.what(), exit_geometry);
   }
-  // What `drape` refuses isn't valid, though it can be built.
-  for (const std::string& reason : refused) fail(reason, exit_input);
   return out;
 }
 
@@ -430,8 +409,10 @@ int check_scene(const std::function<Scene()>& read, bool json, Console& console)
     fmt::print("{}\n", json_text(out));
     return found.code;
   }
+  // What isn't valid gives nothing to work with.
+  std::FILE* out = found.errors.empty() ? stdout : stderr;
   for (const auto* lines : {&found.obstacles, &found.panels})
-    for (const std::string& line : *lines) fmt::print("{}\n", line);
+    for (const std::string& line : *lines) fmt::print(out, "{}\n", line);
   for (const std::string& note : found.notes) console.note(note);
   for (const std::string& note : found.details) console.detail(note);
   for (const std::string& warning : found.warnings) console.warning(warning);

@@ -84,6 +84,27 @@ ContactProjection::Counts contact_counts(const RunResult& run) {
   return counts;
 }
 
+Json seams_json(const Build& build, const RunResult& run, const StateMeasures& m) {
+  if (build.seams.empty()) return {{"max_gap", nullptr}};
+  Json list = Json::array();
+  double widest = 0;
+  for (std::size_t k = 0; k < build.seams.size(); ++k) {
+    const BuiltSeam& seam = build.seams[k];
+    const SceneSeam& named = build.scene.seams[k];
+    widest = std::max(widest, m.seams[k].gap);
+    const auto side = [](const SeamSide& s, double length) -> Json {
+      return {{"panel", s.panel}, {"loop", s.loop}, {"curves", s.curves}, {"length", length}};
+    };
+    list.push_back({{"a", side(named.a, seam.length_a)},
+                    {"b", side(named.b, seam.length_b)},
+                    {"ratio", seam.length_a / seam.length_b},
+                    {"gap", m.seams[k].gap},
+                    {"closed", run.sewing.progress[k]},
+                    {"force_per_length", {{"max", m.seams[k].force}, {"mean", m.seams[k].mean_force}}}});
+  }
+  return {{"max_gap", widest}, {"closed_at", run.sewn > 0 ? Json(run.sewn) : Json(nullptr)}, {"list", list}};
+}
+
 Json contact_json(const Build& build, const System& system, const RunResult& run, const StateMeasures& m) {
   if (!system.contact || !m.contact) return {{"max_penetration", nullptr}, {"min_distance", nullptr}};
   Json out = {{"max_penetration", m.contact->penetration},
@@ -209,9 +230,9 @@ Json report_json(const Build& build, const RunResult& run, const StateMeasures& 
     report["projection"]["percentile_held"] = 100 * run.last_projection.within;
     report["projection"]["worst_row"] = run.last_projection.strain_violation;
   }
-  // Numbers of what doesn't exist in a run are null, not 0: nothing is sewn in this version.
+  // Numbers of what doesn't exist in a run are null, not 0.
   report["contact"] = contact_json(build, system, run, m);
-  report["seams"] = {{"max_gap", nullptr}};
+  report["seams"] = seams_json(build, run, m);
   Json stages = Json::array({"shell"});
   if (system.strain_rows + system.place_rows > 0) stages.push_back("projection");
   if (system.contact) stages.push_back("contact");

@@ -66,6 +66,13 @@ std::vector<std::string> summary(const Build& build, const RunResult& result, co
       line += fmt::format("; obstacle '{}' carries {:.3g} N", build.obstacles[k]->name(), m.contact->forces[k].norm());
     lines.push_back(line);
   }
+  if (!m.seams.empty()) {
+    const auto widest = std::ranges::max_element(m.seams, {}, &SeamMeasures::gap);
+    const auto strongest = std::ranges::max_element(m.seams, {}, &SeamMeasures::force);
+    lines.push_back(fmt::format("  {} seams, open by {:.2g} mm at most (seam {}); seam {} carries up to {:.3g} N/m",
+                                m.seams.size(), 1e3 * widest->gap, widest - m.seams.begin(),
+                                strongest - m.seams.begin(), strongest->force));
+  }
   return lines;
 }
 

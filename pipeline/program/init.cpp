@@ -48,7 +48,7 @@ int run_pattern(const Arguments& a, const Common& common, Console& console) {
   write_file(target, scene.text);
   for (const std::string& note : scene.notes) console.note(note);
   for (const std::string& detail : scene.details) console.detail(detail);
-  console.note(fmt::format("wrote {0}; now: toile check {0}{1}", target.string(), scene.without));
+  console.note(fmt::format("wrote {0}; now: toile check {0}, then toile drape {0}", target.string()));
   say_written({target}, common);
   for (const std::string& panel : scene.refused) console.error(panel);
   return scene.refused.empty() ? exit_ok : exit_geometry;

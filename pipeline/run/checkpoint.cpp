@@ -19,7 +19,7 @@ namespace toile {
 namespace {
 
 constexpr std::string_view first_word = "toile checkpoint ";
-constexpr int format_number = 9;  // raise it when the meaning of a byte changes
+constexpr int format_number = 10;  // raise it when the meaning of a byte changes
 
 // Every step can be undone, so that a change of any one word always shows in the end.
 std::uint64_t checksum(std::string_view bytes) {
@@ -236,7 +236,7 @@ RunResult parse_checkpoint(std::string_view bytes, const std::string& name, cons
   RunResult result;
   RunState& state = result;
   reader(state);
-  result.system = assemble(build, state.assembled, workers);
+  result.system = assemble(build, state.assembled, workers, &state.sewing);
   const System& system = *result.system;
   ProjectionMemory memory;
   if (system.projection) reader(memory);

@@ -139,6 +139,7 @@ StressField stress_field(const Build& build, const System& system, const Eigen::
   ConstraintRows rows = system.projection->rows();
   // A pin along a curve stands for whatever line load its curve may carry.
   rows.place.insert(rows.place.end(), system.along_curves.begin(), system.along_curves.end());
+  rows.place.insert(rows.place.end(), system.along_seams.begin(), system.along_seams.end());
   Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, system.strain_rows);
   if (dt > 0) forces = system.projection->memory().strain_impulses / (dt * dt);
   return StressField(*build.model, *system.map, rows, forces, q);
@@ -200,7 +201,24 @@ std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& sys
   for (std::size_t k = 0; k < system.fixed_pin.size(); ++k)
     out[static_cast<std::size_t>(system.fixed_pin[k])] += r.fixed.col(static_cast<Eigen::Index>(k));
   for (std::size_t k = 0; k < system.place_pin.size(); ++k)
-    out[static_cast<std::size_t>(system.place_pin[k])] += r.place.col(static_cast<Eigen::Index>(k));
+    if (system.place_pin[k] >= 0)
+      out[static_cast<std::size_t>(system.place_pin[k])] += r.place.col(static_cast<Eigen::Index>(k));
+  return out;
+}
+
+std::vector<SeamMeasures> seam_forces(const Build& build, const System& system, const DynamicState& state, double dt) {
+  std::vector<SeamMeasures> out(build.seams.size());
+  if (out.empty() || !(dt > 0)) return out;
+  const Reactions r = reactions(system.dynamic, state, dt);
+  for (std::size_t k = 0; k < system.place_seam.size(); ++k) {
+    const auto [seam, row] = system.place_seam[k];
+    if (seam < 0) continue;
+    const BuiltSeam& built = build.seams[static_cast<std::size_t>(seam)];
+    const double force = r.place.col(static_cast<Eigen::Index>(k)).norm();
+    SeamMeasures& m = out[static_cast<std::size_t>(seam)];
+    m.force = std::max(m.force, force / built.weight[static_cast<std::size_t>(row)]);
+    m.mean_force += force / (0.5 * (built.length_a + built.length_b));
+  }
   return out;
 }
 
@@ -331,6 +349,11 @@ StateMeasures measure(const Build& build, const System& system, const DynamicSta
   if (system.contact && !build.obstacles.empty()) m.contact = measure_contact(build, system, q, state.t, dt);
   m.points = output_points(build, q);
   m.reactions = pin_reactions(build, system, state, dt);
+  m.seams = seam_forces(build, system, state, dt);
+  for (const PlaceRow& place : system.along_seams) {
+    double& gap = m.seams[static_cast<std::size_t>(place.seam)].gap;
+    gap = std::max(gap, apply(place.row, q).norm());
+  }
   m.gaps.resize(build.scene.pins.size());
   for (const PlaceRow& place : system.along_curves) {
     std::optional<double>& gap = m.gaps[static_cast<std::size_t>(place.pin)];

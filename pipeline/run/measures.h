@@ -44,6 +44,11 @@ struct ContactMeasures {
   std::vector<Eigen::Vector3d> forces;  // N, of each obstacle on the cloth in the last step
 };
 
+struct SeamMeasures {
+  double gap = 0;                    // m, largest along it between what is to be one place
+  double force = 0, mean_force = 0;  // N/m of its length that it carries, largest and mean
+};
+
 struct StateMeasures {
   std::optional<ContactMeasures> contact;  // where obstacles are
   Extremes strain;                         // E11, E22
@@ -60,6 +65,7 @@ struct StateMeasures {
   double area = 0, mass = 0;               // m2, kg, of the rest
   std::vector<Eigen::Vector3d> points;     // those that the scene asks for [m]
   std::vector<Eigen::Vector3d> reactions;  // per pin: force on the cloth [N]
+  std::vector<SeamMeasures> seams;         // in the scene's order
   // Per pin along a curve: how far the cloth is from where the pin has it, at most, at 200 places or more along the
   // curve [m].
   std::vector<std::optional<double>> gaps;
@@ -67,8 +73,10 @@ struct StateMeasures {
 // `dt`: of the last step [s], 0 before the first, where nothing is known of the forces of pins and limits.
 StateMeasures measure(const Build& build, const System& system, const DynamicState& state, double dt);
 
-// Parts of it: places of the scene's output points [m], force of each pin on the cloth [N].
+// Parts of it: places of the scene's output points [m], force of each pin on the cloth [N],
+// what seams carry.
 std::vector<Eigen::Vector3d> output_points(const Build& build, const Eigen::VectorXd& q);
+std::vector<SeamMeasures> seam_forces(const Build& build, const System& system, const DynamicState& state, double dt);
 std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& system, const DynamicState& state,
                                            double dt);
 

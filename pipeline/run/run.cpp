@@ -10,6 +10,7 @@
 #include "geometry/clock.h"
 #include "geometry/error.h"
 #include "pipeline/build/contact.h"
+#include "pipeline/run/measures.h"
 
 namespace toile {
 namespace {
@@ -21,6 +22,7 @@ constexpr double rest_share = 1e-4;  // of the largest panel, of the tolerance o
 constexpr double smallest_careful = 1.0 / 16;
 constexpr int first_steps = 10;
 constexpr double implicit_step = 1.0 / 60;  // s, where the scene names none
+constexpr double closing_start = 1e-3;      // of the speed of closing gaps
 constexpr double pins_per_step = 0.1;       // of the longest span
 
 }  // namespace
@@ -65,6 +67,7 @@ class Run::Impl {
     if (result_.exit == RunExit::ok && !result_.last_projection.converged) report_limit();
     if (result_.exit == RunExit::ok && scene_.rest && !at_rest()) report_unrest();
     if (result_.exit == RunExit::ok) check_energy();
+    if (result_.exit == RunExit::ok) check_seams();
     result_.time = result_.state.t;
     result_.energy.gravity = gravity_potential(build_, control_points(*result_.system, result_.state));
     result_.wall_seconds = since(start_);
@@ -116,6 +119,13 @@ class Run::Impl {
     evaluate_bound();
     if (scene_.dt && !implicit()) hold_to_bound();
     result_.watch.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
+    result_.sewing = *result_.system->sewing;
+    if (!result_.sewing.done) {
+      // Gaps begin to close ever so slowly, where nothing else is at work.
+      const double speed = closing_start * scene_.sewing.speed;
+      result_.watch.rounding =
+          std::max(result_.watch.rounding, 0.5 * result_.system->dynamic.node_mass.sum() * speed * speed);
+    }
   }
 
   // Nets that don't follow the threads lock where rows are stiff. (analysis/constraint/README.md, "Which rows")
@@ -218,9 +228,11 @@ class Run::Impl {
       result_.force_seconds += report.force_seconds;
       result_.projection_seconds += report.projection_seconds;
       std::string trouble = unmet(report);
+      const bool no_balance = !trouble.empty();
       if (trouble.empty()) trouble = why_refused(result_.watch, result_.energy, report, result_.dt_last, careful());
       if (trouble.empty()) {
         accept(report);
+        if (!result_.sewing.done) sew(report);
         if (scene_.rest) relax_after(report);
         // The last step of a stretch ends on the target itself, not on a rounded sum.
         if (count == 1 && !halved) result_.state.t = target;
@@ -230,7 +242,11 @@ class Run::Impl {
       if (!halved) result_.accepted = RunState(result_);
       if (!bounded() && !implicit()) hold_to_bound();
       ++result_.redone_steps;
-      result_.control.refuse(!halved);
+      if (no_balance && !result_.sewing.done) {
+        hold_back(result_.sewing, scene_);
+        *result_.system->sewing = result_.sewing;
+      }
+      result_.control.refuse(!halved, no_balance);
       result_.watch.trough = result_.watch.balance;
       if (equilibrating() && hold_back(result_.relaxation)) continue;
       if (equilibrating() || result_.control.exhausted()) {
@@ -295,6 +311,18 @@ class Run::Impl {
                        p.strain_violation, p.place_violation);
   }
 
+  // Once the seams are closed, or can't be, the stage is over: gravity and friction come.
+  void sew(const StepReport& report) {
+    const DynamicState& state = result_.state;
+    std::vector<double> force;
+    for (const SeamMeasures& seam : seam_forces(build_, *result_.system, state, report.dt)) force.push_back(seam.force);
+    go_on(result_.sewing, scene_, build_.seams, force, state.t, report.dt);
+    *result_.system->sewing = result_.sewing;
+    if (!result_.sewing.done) return;
+    result_.sewn = state.t;
+    assemble_anew();
+  }
+
   // Pins that would go far within a step would tear at the cloth beside them before the rest of it moves.
   double held_to_pins(double dt) {
     const double way = pins_move(*result_.system, result_.state.t, dt, pins_now_, pins_then_),
@@ -311,7 +339,7 @@ class Run::Impl {
       result_.watch.balance -= report.at_end ? report.kinetic_end : report.kinetic;
       result_.watch.trough = result_.watch.balance;
     }
-    if (result_.state.t < motion_done_) restart(relaxation);
+    if (result_.state.t < motion_done_ || !result_.sewing.done) restart(relaxation);
   }
   std::string unrest() const {
     if (result_.system->path && result_.path.factor != 1)
@@ -326,6 +354,23 @@ class Run::Impl {
         "not at rest after {} steps: {}, allowed is {:.3g} m. Resume with a larger "
         "solver.rest.max_steps or solver.rest.tolerance",
         result_.relaxation.steps, unrest(), tolerance_);
+  }
+
+  void check_seams() {
+    for (std::size_t k = 0; k < build_.seams.size(); ++k) {
+      const double progress = result_.sewing.progress[k];
+      if (progress >= 1) continue;
+      const SceneSeam& seam = scene_.seams[k];
+      result_.exit = RunExit::check_failed;
+      result_.reason = fmt::format(
+          "{}: seam {}, of panel '{}' to panel '{}', is still open by {:.3g} mm{}", seam.where, k, seam.a.panel,
+          seam.b.panel, 1e3 * open_part(progress) * build_.seams[k].gap,
+          result_.sewing.done ? fmt::format(" where it carries its {:.3g} N/m (sewing.force): the garment is too small "
+                                            "there for what it goes around, or is held apart",
+                                            scene_.sewing.force)
+                              : "; a later solver.until gives it the time to close");
+      return;
+    }
   }
 
   // Less than what ends a run, but more than a stable one gains.
@@ -373,11 +418,16 @@ class Run::Impl {
   void release(double t) {
     const bool any =
         std::ranges::any_of(scene_.pins, [&](const ScenePin& pin) { return pin.release && *pin.release == t; });
-    if (!any) return;
+    if (any) assemble_anew();
+  }
+
+  // The state goes on under what holds from now on.
+  void assemble_anew() {
+    const double t = result_.state.t;
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     const Eigen::VectorXd v = control_point_velocity(*result_.system, result_.state);
     if (result_.system->contact) result_.former_contact += result_.system->contact->counts();
-    result_.system = assemble(build_, t, hooks_.workers);
+    result_.system = assemble(build_, t, hooks_.workers, &result_.sewing);
     result_.assembled = t;
     result_.state = state_from(*result_.system, q, v, t);
     // The released control points' kinetic energy joins the balance.

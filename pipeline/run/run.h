@@ -47,6 +47,8 @@ struct RunState {
   bool relaxing = false;  // on the way to rest: without drag
   Relaxation relaxation;
   PathPoint path;  // where loads grow in steps
+  Sewing sewing;
+  double sewn = 0;  // s, when that was done; 0: not yet, or from the start
   int frames = 0, steps = 0, redone_steps = 0;
   std::vector<double> frame_times;  // s, of the frames so far
   double dt_min = 0, dt_max = 0, dt_last = 0;
@@ -59,9 +61,9 @@ struct RunState {
 };
 
 void fields(auto& archive, Like<RunState> auto& s) {
-  archive(s.state, s.assembled, s.done, s.control, s.watch, s.relaxing, s.relaxation, s.path, s.frames, s.steps,
-          s.redone_steps, s.frame_times, s.dt_min, s.dt_max, s.dt_last, s.bound, s.energy, s.iterations_sum,
-          s.iterations_max, s.unconverged_steps, s.last_projection, s.warnings);
+  archive(s.state, s.assembled, s.done, s.control, s.watch, s.relaxing, s.relaxation, s.path, s.sewing, s.sewn,
+          s.frames, s.steps, s.redone_steps, s.frame_times, s.dt_min, s.dt_max, s.dt_last, s.bound, s.energy,
+          s.iterations_sum, s.iterations_max, s.unconverged_steps, s.last_projection, s.warnings);
 }
 
 struct RunResult : RunState {

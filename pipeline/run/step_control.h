@@ -14,12 +14,14 @@ inline constexpr double step_safety = 0.9;  // of the stable step
 //   (1) The bound is asked for anew every 100 steps, less often, up to every 400, where it hardly changes, and at once
 //       where strain has made the cloth stiffer by a fifth.
 //   (2) A refused step halves the scale, ten times at most; it doubles again after 100 quiet steps, after twice as many
-//       each time that a step was refused.
+//       each time that a step was refused. Where the step found no balance, as where cloth first meets something, it
+//       doubles after ten, and is no more patient for that.
 //   (3) A step whose projection had to damp was too large for accuracy: the next are smaller by a fifth, down to a
 //       quarter of the plan.
 struct StepControl {
   double scale = 1;                            // of the planned step
   int calm = 0, patience = 100;                // steps since one was refused or the scale rose; until it rises
+  bool unmet = false;                          // the last refusals were for want of balance: less patience is enough
   int steps_since_bound = 0, bound_every = 0;  // steps
   StrainRange strain, strain_at_bound;         // now, and when the bound was asked for
 
@@ -31,11 +33,12 @@ struct StepControl {
   void settle_interval(int interval_before, double before, double dt);
 
   void accept(const StrainRange& now, bool damped);
-  void refuse(bool first_try);  // `first_try`: not after another refusal of the same step
-  bool exhausted() const;       // no smaller step is tried
+  // `first_try`: not after another refusal of the same step. `no_balance`: not for its energy.
+  void refuse(bool first_try, bool no_balance = false);
+  bool exhausted() const;  // no smaller step is tried
 };
 void fields(auto& archive, Like<StepControl> auto& c) {
-  archive(c.scale, c.calm, c.patience, c.steps_since_bound, c.bound_every, c.strain, c.strain_at_bound);
+  archive(c.scale, c.calm, c.patience, c.unmet, c.steps_since_bound, c.bound_every, c.strain, c.strain_at_bound);
 }
 
 }  // namespace toile

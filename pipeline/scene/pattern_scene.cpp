@@ -348,17 +348,11 @@ void say_overlap(const Pattern& pattern, const TriangleMesh& mesh, PatternScene&
   out.notes.push_back(text);
 }
 
-std::string head_text(const std::filesystem::path& path, const std::filesystem::path& scene, const PatternScene& out) {
-  std::string text = fmt::format(
+std::string head_text(const std::filesystem::path& path, const std::filesystem::path& scene) {
+  return fmt::format(
       "# {} as a scene: toile init --pattern. Lengths in metres, or with units: \"20 mm\"; y points up.\n"
       "# toile inspect {} --svg panels.svg     shows the loop and curve numbers used below\n",
       path.filename().string(), path_from(scene, path));
-  if (!out.without.empty())
-    text += fmt::format(
-        "# Seams are not simulated by this version. Without them each panel drapes alone:\n"
-        "#   toile drape {}{}\n",
-        scene.filename().string(), out.without);
-  return text;
 }
 
 std::string panel_text(const Pattern& pattern, std::size_t k, const std::string& file, const PanelChoice& choice) {
@@ -401,9 +395,8 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
   out.warnings = pattern.file.warnings;
   out.details = pattern.file.notes;
   out.refused = pattern.file.refused;
-  if (!pattern.stitches.empty()) out.without = " --set 'seam=[]'";
   std::string& text = out.text;
-  text = head_text(path, scene, out);
+  text = head_text(path, scene);
   bool drawing = false;
   if (!is_pattern(path)) {
     if (auto places = hang_upright(pattern.file.panels)) {
@@ -421,7 +414,11 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
   if (written.size.empty() && pattern.file.sizes.size() > 1) written.size = pattern.file.size;
   for (std::size_t k = 0; k < pattern.file.panels.size(); ++k)
     text += panel_text(pattern, k, path_from(scene, path), written);
-  text += '\n' + fabric_tables() + pins_text(pattern);
+  const bool worn = body && !pattern.stitches.empty();
+  text += '\n' + fabric_tables() +
+          (worn ? "\n# Nothing holds the garment but the body: it is sewn around it without gravity, then falls into "
+                  "place.\n"
+                : pins_text(pattern));
   if (mesh) {
     say_overlap(pattern, *mesh, out);
     if (const std::string advice = waist_advice(pattern, *mesh); !advice.empty()) {
@@ -433,9 +430,10 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
   if (body) {
     text += fmt::format("\n[[obstacle]]\nmesh = {}\nunit = \"m\"\nfriction = 0.3\n", quoted(path_from(scene, *body)));
   }
-  text +=
-      "\n[load]\ngravity = [0, -9.81, 0]\n\n[solver]\nuntil = \"0.8 s\"\n\n[output]\nevery = \"1/30 s\"\n"
-      "formats = [\"vtu\"]     # also \"iges\", \"obj\", \"glb\", ...\n";
+  text += fmt::format(
+      "\n[load]\ngravity = [0, -9.81, 0]\n\n[solver]\nuntil = \"{} s\"\n\n[output]\nevery = \"1/30 s\"\n"
+      "formats = [\"vtu\"]     # also \"iges\", \"obj\", \"glb\", ...\n",
+      worn ? "3" : "0.8");
   out.notes.push_back(fmt::format("{} panels, {} seams{}", pattern.file.panels.size(), pattern.stitches.size(),
                                   body ? ", a body" : ""));
   if (pattern.file.sizes.size() > 1) {

@@ -18,7 +18,6 @@ struct PatternScene {
   std::vector<std::string> warnings;  // what the user should look at
   std::vector<std::string> details;   // decisions that say nothing against the pattern
   std::vector<std::string> refused;   // panels of the pattern that the scene does without, and why
-  std::string without;                // options that leave out what this version doesn't simulate
 };
 
 // Complete and valid: panels in their places, each hung by its highest edges; a seam for every stitch, its direction

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "pipeline/scene/scene.h"
 #include "pipeline/scene/toml_table.h"
@@ -18,6 +19,10 @@ std::filesystem::path beside(const std::filesystem::path& scene, const std::stri
 
 Placement read_placement(Table table);
 PinMotion read_motion(Table& move);
+// The panel that a table names, or the scene's only one.
+std::string panel_key(Table& table, const std::vector<ScenePanel>& panels);
+// Once panels are read: [[seam]] and [sewing].
+void read_seams(Table& top, Scene& scene);
 
 // [[obstacle]] and, once panels and obstacles are read, [[contact_pair]].
 void read_obstacles(Table& top, Scene& scene);

@@ -251,19 +251,6 @@ ScenePanel read_panel(Table table, const std::filesystem::path& scene, const Fab
 }
 
 // The panel that a pin, traction or output point names; may be left out where there is only one.
-std::string panel_key(Table& table, const std::vector<ScenePanel>& panels) {
-  const auto name = table.string("panel");
-  if (!name) {
-    if (panels.size() == 1) return panels[0].name;
-    table.missing("panel", "the scene has several");
-  }
-  std::vector<std::string> names;
-  for (const ScenePanel& panel : panels) names.push_back(panel.name);
-  if (std::ranges::find(names, *name) == names.end()) {
-    table.fail(*table.raw().get("panel"), fmt::format("no panel is called '{}'{}", *name, suggestion(*name, names)));
-  }
-  return *name;
-}
 
 Address address(Table& table, const std::string& key) {
   const auto text = table.string(key);
@@ -339,63 +326,6 @@ SceneForce read_force(Table table, const std::vector<ScenePanel>& panels) {
   load.force = *force;
   table.done();
   return load;
-}
-
-// curves = [0, 1, 2]; empty where there is no such key.
-std::vector<int> read_curves(Table& table) {
-  const toml::node* node = table.find("curves");
-  if (!node) return {};
-  std::vector<int> out;
-  const toml::array* array = node->as_array();
-  for (std::size_t k = 0; array && k < array->size(); ++k) {
-    const auto number = (*array)[k].value<std::int64_t>();
-    if (!number || *number < 0 || *number > 1000000) array = nullptr;
-    if (number) out.push_back(static_cast<int>(*number));
-  }
-  if (!array || out.empty())
-    table.fail(*node, "curves must be an array of the curves' numbers in their loop, such as [0, 1]");
-  return out;
-}
-
-SeamSide read_seam_side(Table& seam, const char* key, const std::vector<ScenePanel>& panels) {
-  auto table = seam.table(key, fmt::format("{} of [[seam]]", key));
-  if (!table) seam.missing(key, "one side, such as { panel = \"front\", loop = 0, curve = 1 }");
-  SeamSide side;
-  side.panel = panel_key(*table, panels);
-  side.loop = table->integer("loop", 0, 1000000).value_or(0);
-  const auto curve = table->integer("curve", 0, 1000000);
-  side.curves = read_curves(*table);
-  if (curve && !side.curves.empty())
-    table->fail(*table->raw().get("curves"), "a side has a curve or curves = [...], not both");
-  if (curve) side.curves = {*curve};
-  if (side.curves.empty()) table->missing("curve", "its number in the loop; toile inspect shows it");
-  table->number(side.from, "from", dimension::none, Range::nonnegative);
-  table->number(side.to, "to", dimension::none, Range::positive);
-  if (!(side.from < side.to && side.to <= 1)) {
-    throw InputError(
-        fmt::format("{}: a side runs from {} to {} of its length, must be fractions of 0 to 1, from below to",
-                    table->where(), side.from, side.to));
-  }
-  side.reverse = table->boolean("reverse").value_or(false);
-  table->done();
-  return side;
-}
-
-SceneSeam read_seam(Table table, const std::vector<ScenePanel>& panels) {
-  SceneSeam seam;
-  seam.where = table.where();
-  seam.a = read_seam_side(table, "a", panels);
-  seam.b = read_seam_side(table, "b", panels);
-  table.done();
-  for (const int curve : seam.a.curves) {
-    const bool there = std::ranges::find(seam.b.curves, curve) != seam.b.curves.end();
-    const bool apart = seam.a.to <= seam.b.from || seam.b.to <= seam.a.from;
-    const bool part = seam.a.curves == seam.b.curves && apart;
-    if (seam.a.panel != seam.b.panel || seam.a.loop != seam.b.loop || !there || part) continue;
-    throw InputError(fmt::format("{}: the seam joins curve {},{} of panel '{}' with itself", seam.where, seam.a.loop,
-                                 curve, seam.a.panel));
-  }
-  return seam;
 }
 
 FileFormat frame_format(Table& table, const toml::node& entry) {
@@ -483,11 +413,27 @@ void snap_releases(Scene& scene) {
   }
 }
 
+// A panel and all that seams join to it.
+std::vector<std::string> sewn_to(const Scene& scene, const std::string& panel) {
+  std::vector<std::string> out{panel};
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    for (const SceneSeam& seam : scene.seams) {
+      for (const auto& [one, other] : {std::pair(&seam.a, &seam.b), std::pair(&seam.b, &seam.a)}) {
+        if (one->panel == out[k] && std::ranges::find(out, other->panel) == out.end()) out.push_back(other->panel);
+      }
+    }
+  }
+  return out;
+}
+
 // Cloth that falls for ever has no rest.
 void require_pins_for_rest(const Scene& scene) {
   if (!scene.rest) return;
   for (const ScenePanel& panel : scene.panels) {
-    const auto holds = [&](const ScenePin& pin) { return pin.panel == panel.name && !pin.release; };
+    const std::vector<std::string> garment = sewn_to(scene, panel.name);
+    const auto holds = [&](const ScenePin& pin) {
+      return !pin.release && std::ranges::find(garment, pin.panel) != garment.end();
+    };
     const auto pulls = [&](const auto& load) { return load.panel == panel.name; };
     if (std::ranges::any_of(scene.pins, holds) || !scene.obstacles.empty()) continue;
     if (scene.gravity.isZero(0) && scene.wind.isZero(0) && std::ranges::none_of(scene.tractions, pulls) &&
@@ -531,7 +477,7 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
     scene.tractions.push_back(read_traction(table, scene.panels));
   }
   for (Table& table : top.tables("force", "[[force]]")) scene.forces.push_back(read_force(table, scene.panels));
-  for (Table& table : top.tables("seam", "[[seam]]")) scene.seams.push_back(read_seam(table, scene.panels));
+  read_seams(top, scene);
   read_obstacles(top, scene);
   read_contact_pairs(top, scene);
   read_settings(top, scene);
@@ -547,6 +493,20 @@ Scene read_tables(toml::table& root, const std::filesystem::path& path, std::spa
 }
 
 }  // namespace
+
+std::string panel_key(Table& table, const std::vector<ScenePanel>& panels) {
+  const auto name = table.string("panel");
+  if (!name) {
+    if (panels.size() == 1) return panels[0].name;
+    table.missing("panel", "the scene has several");
+  }
+  std::vector<std::string> names;
+  for (const ScenePanel& panel : panels) names.push_back(panel.name);
+  if (std::ranges::find(names, *name) == names.end()) {
+    table.fail(*table.raw().get("panel"), fmt::format("no panel is called '{}'{}", *name, suggestion(*name, names)));
+  }
+  return *name;
+}
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, std::span<const std::string> settings) {
   toml::table root = parse_toml(text, path);

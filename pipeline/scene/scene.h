@@ -74,10 +74,15 @@ struct SeamSide {
   double from = 0, to = 1;
   bool reverse = false;
 };
-// Read and checked; not simulated yet.
 struct SceneSeam {
   SeamSide a, b;
   std::string where;
+};
+// How gaps between the sides of seams close.
+struct SceneSewing {
+  double speed = 0.5;                      // m/s, of the widest gap
+  double force = 200;                      // N/m, that a seam may carry while it closes
+  bool gravity = false, friction = false;  // whether they act before the seams are closed
 };
 
 // What holds the strain limit, by solver and variant of [strain_limit]: PrimalDual, Substeps, FastProjection with eqs.
@@ -148,6 +153,7 @@ struct Scene {
   std::vector<SceneTraction> tractions;
   std::vector<SceneForce> forces;
   std::vector<SceneSeam> seams;
+  SceneSewing sewing;
   std::vector<SceneObstacle> obstacles;
   std::vector<SceneContactPair> contact_pairs;
   SceneContact contact;

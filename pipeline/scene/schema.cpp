@@ -35,6 +35,7 @@ force = [0, 0, 1]
 [[seam]]
 a = {{ curve = 0 }}
 b = {{ curve = 1 }}
+[sewing]
 [[obstacle]]
 name = "body"
 mesh = "{0}"

@@ -224,7 +224,7 @@ TEST(SelectRows, PinsThatContradictEachOtherAreNamed) {
     select_rows(model, map, strip.points, {pin(2, 0.9, 0.5, 0), pin(4, 0.3, 0.5, 0), pin(7, 0.3, 0.5, 0.1)});
     FAIL() << "accepted";
   } catch (const SolverError& error) {
-    EXPECT_NE(std::string(error.what()).find("pins 4 and 7"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("pin 4 and pin 7"), std::string::npos) << error.what();
   }
 }
 

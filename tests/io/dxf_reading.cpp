@@ -418,6 +418,8 @@ TEST(Dxf, BlocksInBlocksAreReadOrNamed) {
             std::string::npos);
   expect_error(file(block("A", poly("1", rectangle, true)), insert("A", " 41\n0\n") + metric),
                "INSERT: block 'A' has the scale 0");
+}
+
 // So many that looking through all blocks for each insert would take hours.
 TEST(Dxf, BlocksMayNestDeep) {
   constexpr int depth = 20000;

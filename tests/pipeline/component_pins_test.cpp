@@ -152,7 +152,7 @@ TEST(ComponentPins, WhatCanNotHoldThemSaysSoByTheKey) {
     EXPECT_NE(refusal("[[pin]]\nat = \"edge:u0\"\nhold = \"" + std::string(hold) + "\"\n").find("hold = "),
               std::string::npos)
         << hold;
-  EXPECT_NE(refusal("[[pin]]\nat = \"corner:0,0\"\nhold = \"x\"\nclamp = true\n").find("works at edges"),
+  EXPECT_NE(refusal("[[pin]]\nat = \"corner:0,0\"\nhold = \"x\"\nclamp = true\n").find("works at whole edges only"),
             std::string::npos);
   EXPECT_NE(refusal(pin + "clamp = true\nmove = { end = 1 }\n").find("can't move"), std::string::npos);
 }
