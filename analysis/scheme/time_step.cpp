@@ -59,7 +59,7 @@ double largest_pair(const Eigen::Ref<const Eigen::VectorXd>& diagonal, const Eig
 // Lanczos with full reorthogonalisation on M^-1/2 T^T K T M^-1/2: the residual of the largest Ritz pair bounds its
 // distance to an eigenvalue, the largest one for all but unlucky starts. [Parlett 1998, ch. 13]
 TimeStepBound time_step_bound(const Model& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                              const Eigen::VectorXd& q, Workers* workers) {
+                              const Eigen::VectorXd& q, Workers* workers, const Potential* besides) {
   TimeStepBound bound;
   bound.dt = std::numeric_limits<double>::infinity();
   const int nodes = map.nodes();
@@ -71,7 +71,8 @@ TimeStepBound time_step_bound(const Model& model, const AffineMap& map, const Ei
                         text(node_mass[k]) + " kg");
   const Eigen::VectorXd scale = node_mass.cwiseSqrt().cwiseInverse().replicate(1, 3).transpose().reshaped();
 
-  const std::vector<const Potential*> potentials = model.potentials();
+  std::vector<const Potential*> potentials = model.potentials();
+  if (besides) potentials.push_back(besides);
   const int steps = static_cast<int>(std::min<Eigen::Index>(max_iterations, n));
   Eigen::MatrixXd basis(n, steps);
   Eigen::VectorXd alpha(steps), beta(steps), ritz_vector, dx(n), dq(3 * map.control_points()), df(dq.size()), image(n);

@@ -21,8 +21,9 @@ void fields(auto& archive, Like<TimeStepBound> auto& b) {
 
 // Of the undamped, unprojected model at q, with the slope of the bending law at q's curvatures: a state that unbends
 // gets stiffer, so a run asks again. Cost: 20 to 60 applications of the tangent. Deterministic. Throws SolverError
-// naming the node where a mass is not positive, or where the stiffness at q is not finite.
+// naming the node where a mass is not positive, or where the stiffness at q is not finite. `besides`: a potential more
+// than the model's.
 TimeStepBound time_step_bound(const Model& model, const AffineMap& map, const Eigen::VectorXd& node_mass,
-                              const Eigen::VectorXd& q, Workers* workers = nullptr);
+                              const Eigen::VectorXd& q, Workers* workers = nullptr, const Potential* besides = nullptr);
 
 }  // namespace toile

@@ -19,6 +19,7 @@ using Eigen::Vector3d;
 
 constexpr int least_places = 200;
 constexpr double least_gap = 1e-9;  // m, that takes time to close
+constexpr double near_gap = 5e-3;   // m, that rows close without springs
 
 // A side with its panel.
 struct Side {
@@ -209,12 +210,21 @@ std::vector<BuiltSeam> build_seams(const Build& build, std::vector<std::string>&
 
 namespace {
 
-// Of progress, where nothing holds a seam up [1/s].
-double full_rate(const Scene& scene, const std::vector<BuiltSeam>& seams) {
-  constexpr double peak = 1.875;  // of the speed, over the mean
+double widest_gap(const std::vector<BuiltSeam>& seams, const Eigen::VectorXd& q) {
   double widest = 0;
-  for (const BuiltSeam& seam : seams) widest = std::max(widest, seam.gap);
-  return widest > least_gap ? scene.sewing.speed / (peak * widest) : HUGE_VAL;
+  for (const BuiltSeam& seam : seams)
+    for (const SeamPlace& place : seam.along) widest = std::max(widest, apply(place.row, q).norm());
+  return widest;
+}
+
+// Of progress, where nothing holds a seam up [1/s].
+double full_rate(const Scene& scene, double gap) {
+  constexpr double peak = 1.875;  // of the speed, over the mean
+  return scene.sewing.speed / (peak * gap);
+}
+
+double gap_at_start(const std::vector<BuiltSeam>& seams) {
+  return seams.empty() ? 0 : std::ranges::max_element(seams, {}, &BuiltSeam::gap)->gap;
 }
 
 }  // namespace
@@ -224,22 +234,41 @@ double Sewing::progress_at(int seam, double t) const {
   return std::min(1.0, progress[k] + rate[k] * (t - since));
 }
 
-Sewing open_seams(const Scene& scene, const std::vector<BuiltSeam>& seams) {
-  const double rate = full_rate(scene, seams);
+Sewing open_seams(const Scene& scene, const std::vector<BuiltSeam>& seams, const Eigen::VectorXd& start) {
   Sewing out;
-  out.done = !std::isfinite(rate);
-  out.progress.assign(seams.size(), out.done ? 1 : 0);
-  out.rate.assign(seams.size(), out.done ? 0 : rate);
+  const double gap = gap_at_start(seams);
+  out.progress.assign(seams.size(), 1);
+  out.rate.assign(seams.size(), 0);
   out.force.assign(seams.size(), 0);
   out.most.assign(seams.size(), scene.sewing.force);
+  if (gap <= least_gap) return out;
+  if (gap <= near_gap) {
+    begin_rows(out, scene, seams, start, 0);
+    return out;
+  }
+  out.stage = Sewing::springs;
+  out.progress.assign(seams.size(), 0);
+  out.rate.assign(seams.size(), full_rate(scene, gap));
   return out;
 }
 
-void go_on(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& seams, const std::vector<double>& force,
+void begin_rows(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& seams, const Eigen::VectorXd& q,
+                double t) {
+  sewing.stage = Sewing::rows;
+  sewing.from = q;
+  sewing.since = t;
+  sewing.waiting = 0;
+  sewing.progress.assign(seams.size(), 0);
+  sewing.rate.assign(seams.size(), full_rate(scene, std::max(widest_gap(seams, q), near_gap)));
+  sewing.force.assign(seams.size(), 0);
+}
+
+bool go_on(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& seams, const std::vector<double>& force,
            double t, double dt) {
-  constexpr double memory = 0.02, patience = 0.3;  // s
-  constexpr double slow = 0.02;                    // of the full rate
-  const double full = full_rate(scene, seams);
+  constexpr double memory = 0.02, patience = 0.3, recovery = 0.05;  // s
+  constexpr double slow = 0.02;                                     // of the full rate
+  const bool rows = sewing.stage == Sewing::rows;
+  const double full = full_rate(scene, rows ? std::max(widest_gap(seams, sewing.from), near_gap) : gap_at_start(seams));
   bool moving = false, open = false;
   for (std::size_t k = 0; k < seams.size(); ++k) {
     sewing.progress[k] = sewing.progress_at(static_cast<int>(k), t);
@@ -249,18 +278,27 @@ void go_on(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& sea
       continue;
     }
     open = true;
-    sewing.rate[k] = full * std::clamp(2 * (1 - sewing.force[k] / sewing.most[k]), 0.0, 1.0);
+    // Springs are bounded by themselves.
+    const double share = rows ? std::clamp(2 * (1 - sewing.force[k] / sewing.most[k]), 0.0, 1.0) : 1;
+    sewing.rate[k] = std::min(full * share, sewing.rate[k] + full * dt / recovery);
     moving = moving || sewing.rate[k] > slow * full;
   }
   sewing.since = t;
   sewing.waiting = moving ? 0 : sewing.waiting + dt;
-  if (open && sewing.waiting < patience) return;
-  sewing.done = true;
-  std::ranges::fill(sewing.rate, 0.0);
+  if (rows) {
+    if (open && sewing.waiting < patience) return false;
+    sewing.stage = Sewing::closed;
+    std::ranges::fill(sewing.rate, 0.0);
+    return true;
+  }
+  // Pulled as far as they come.
+  const double pulled = *std::ranges::max_element(sewing.force);
+  return !open && (pulled < near_gap * spring_stiffness || sewing.waiting >= patience);
 }
 
 void hold_back(Sewing& sewing, const Scene& scene) {
   constexpr double little = 0.05;  // of what a seam may carry: it isn't to blame
+  for (double& rate : sewing.rate) rate /= 2;
   const auto most = std::ranges::max_element(sewing.force);
   if (most == sewing.force.end() || *most < little * scene.sewing.force) return;
   const auto k = static_cast<std::size_t>(most - sewing.force.begin());

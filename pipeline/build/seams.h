@@ -38,28 +38,36 @@ struct BuiltSeam {
 // Throws GeometryError where a curve doesn't exist, or a side has no length.
 std::vector<BuiltSeam> build_seams(const Build& build, std::vector<std::string>& warnings);
 
-// How far the seams are closed. All close together, the widest gap at the scene's speed; a seam that carries more than
-// its force waits: there the garment is too small for what it goes around.
+// How far the seams are closed. First springs pull the sides to each other, around a body if need be: all together, the
+// widest gap at the scene's speed. Then rows close what is left, along the way that it has then. A seam that carries
+// more than its force waits: there the garment is too small for what it goes around.
 struct Sewing {
-  std::vector<double> progress, rate, force;  // per seam: 0 to 1, 1/s, N/m that it carried of late
+  enum Stage : int { springs, rows, closed };  // closed, or no longer waited for
+  int stage = closed;
+  std::vector<double> progress, rate, force;  // of the stage, per seam: 0 to 1, 1/s, N/m that it carried of late
   std::vector<double> most;                   // N/m, that it may carry
   double since = 0;                           // s, when that was noted
   double waiting = 0;                         // s, that all open ones have hardly moved
-  bool done = true;                           // closed, or no longer waited for
+  Eigen::VectorXd from;                       // control points at the start of the stage of rows [m]
 
+  bool done() const { return stage == closed; }
   double progress_at(int seam, double t) const;
 };
 void fields(auto& archive, Like<Sewing> auto& s) {
-  archive(s.progress, s.rate, s.force, s.most, s.since, s.waiting, s.done);
+  archive(s.stage, s.progress, s.rate, s.force, s.most, s.since, s.waiting, s.from);
 }
-// Of the start.
-Sewing open_seams(const Scene& scene, const std::vector<BuiltSeam>& seams);
-// After a step of dt to t in which the seams carried `force` [N/m].
-void go_on(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& seams, const std::vector<double>& force,
+// Of the start; then at each end of a stage, with the control points there.
+Sewing open_seams(const Scene& scene, const std::vector<BuiltSeam>& seams, const Eigen::VectorXd& start);
+void begin_rows(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& seams, const Eigen::VectorXd& q,
+                double t);
+// After a step of dt to t in which the seams carried `force` [N/m]. True where the stage is over.
+bool go_on(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& seams, const std::vector<double>& force,
            double t, double dt);
-
-// After a step that found no balance: the seam that carries most may carry no more than that.
+// After a step that found no balance: all close at half the rate, which grows again in the steps that follow, and the
+// seam that carries most may carry no more than that.
 void hold_back(Sewing& sewing, const Scene& scene);
+
+constexpr double spring_stiffness = 1000;  // N/m2: 10 N/m, as of a tight waist, leave 10 mm to the rows
 
 // What is left of a gap, 1 to 0, with a speed and an acceleration that rise and fall smoothly.
 double open_part(double progress);

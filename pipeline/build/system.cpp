@@ -173,7 +173,8 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
   const Scene& scene = build.scene;
   require_solver_of_components(scene);
   auto system = std::make_unique<System>();
-  *system->sewing = sewing ? *sewing : open_seams(scene, build.seams);
+  *system->sewing = sewing ? *sewing : open_seams(scene, build.seams, build.start);
+  const bool pulled = system->sewing->stage == Sewing::springs;
 
   // What each pin holds.
   struct Held {
@@ -281,7 +282,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
   if (build.model->point_count() >= least_control_points_for_threads) dynamic.workers = workers;
   dynamic.map = system->map.get();
   dynamic.loads = build.loads;
-  if (!system->sewing->done && !scene.sewing.gravity)
+  if (!system->sewing->done() && !scene.sewing.gravity)
     for (int i = 0; i < build.model->point_count(); ++i)
       dynamic.loads.force.segment<3>(3 * i) -= build.model->lumped_mass()[i] * scene.gravity;
   dynamic.node_mass = system->map->reduce_scalar(build.model->lumped_mass());
@@ -295,7 +296,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
   }
 
   // After the pins: where they hold both sides of a seam, it holds nothing.
-  for (std::size_t s = 0; s < build.seams.size(); ++s) {
+  for (std::size_t s = 0; s < build.seams.size() && !pulled; ++s) {
     const BuiltSeam& seam = build.seams[s];
     for (std::size_t k = 0; k < seam.rows.size(); ++k) {
       candidates.push_back({.row = seam.rows[k].row,
@@ -306,7 +307,8 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
     }
   }
   const auto closing = [&build, clock = system->sewing](const ScalarRow& row, int seam) {
-    return [gap = Eigen::Vector3d(apply(row, build.start)), clock, seam](double time) -> Eigen::Vector3d {
+    const Eigen::VectorXd& from = clock->from.size() > 0 ? clock->from : build.start;
+    return [gap = Eigen::Vector3d(apply(row, from)), clock, seam](double time) -> Eigen::Vector3d {
       return open_part(clock->progress_at(seam, time)) * gap;
     };
   };
@@ -334,6 +336,14 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
       rows.place.back().target = [moved, pin, from](double time) { return moved(pin, from, time); };
     system->place_pin.push_back(pin);
     system->place_seam.push_back({-1, -1});
+  }
+  if (pulled) {
+    std::vector<SeamSpring> springs;
+    for (const BuiltSeam& seam : build.seams)
+      for (std::size_t k = 0; k < seam.rows.size(); ++k) springs.push_back({seam.rows[k].row, seam.weight[k], 0});
+    system->springs = std::make_unique<SeamSprings>(std::move(springs), spring_stiffness, scene.sewing.force);
+    set_sewing(*system, build, *system->sewing, build.start);
+    dynamic.potentials.push_back(system->springs.get());
   }
   for (std::size_t s = 0; s < build.seams.size(); ++s)
     for (const SeamPlace& place : build.seams[s].along)
@@ -379,7 +389,7 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
     system->projection->use_threads(dynamic.workers);
   }
   if (touches(scene)) {
-    auto contact = with_contact(build, system->sewing->done, *system->map, dynamic.node_mass, dynamic.node_drag,
+    auto contact = with_contact(build, system->sewing->done(), *system->map, dynamic.node_mass, dynamic.node_drag,
                                 std::move(system->projection));
     contact->use_threads(dynamic.workers);
     system->contact = contact.get();
@@ -402,6 +412,19 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
         dynamic, PathOptions{.load_steps = *scene.rest->load_steps, .arc_length = scene.rest->arc_length});
   }
   return system;
+}
+
+double set_sewing(System& system, const Build& build, const Sewing& sewing, const Eigen::VectorXd& q) {
+  *system.sewing = sewing;
+  if (!system.springs) return 0;
+  const double before = system.springs->energy(q);
+  std::size_t spring = 0;
+  for (std::size_t s = 0; s < build.seams.size(); ++s) {
+    const double open = open_part(sewing.progress[s]);
+    for (const SeamPlace& place : build.seams[s].rows)
+      system.springs->set_slack(spring++, open * apply(place.row, build.start).norm());
+  }
+  return system.springs->energy(q) - before;
 }
 
 double pins_move(const System& system, double t, double dt, Eigen::Matrix3Xd& now, Eigen::Matrix3Xd& then) {

@@ -12,6 +12,7 @@
 #include "analysis/contact/contact_projection.h"
 #include "analysis/scheme/equilibrium_path.h"
 #include "analysis/scheme/implicit.h"
+#include "analysis/seam/seam_springs.h"
 #include "pipeline/build/build.h"
 
 namespace toile {
@@ -31,7 +32,8 @@ struct System {
   std::vector<int> place_pin;                  // pin of each place row; -1: it is of a seam
   std::vector<std::array<int, 2>> place_seam;  // of each place row: seam and which of its rows; -1: it is of a pin
   std::vector<PlaceRow> along_seams;           // places along each seam, closely
-  std::shared_ptr<Sewing> sewing = std::make_shared<Sewing>();  // how far they are closed; the run sets it
+  std::shared_ptr<Sewing> sewing = std::make_shared<Sewing>();  // how far they are closed; set_sewing()
+  std::unique_ptr<SeamSprings> springs;                         // while they pull; null: rows hold
   std::vector<PlaceRow> along_curves;  // 200 places along each curve that a pin holds by some of its points
   std::unique_ptr<AffineMap> map;
   std::unique_ptr<ConstraintSolver> projection;  // null: nothing to project
@@ -59,6 +61,9 @@ double default_limit_stiffness(const Build& build, int panel);
 // unless the scene wants them.
 std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers = nullptr,
                                  const Sewing* sewing = nullptr);
+
+// How far seams are closed from here on; what that adds to the energy of springs at q [J].
+double set_sewing(System& system, const Build& build, const Sewing& sewing, const Eigen::VectorXd& q);
 
 // How far the control points and places that pins move go from t to t + dt at most [m]. `now`, `then`: working memory.
 double pins_move(const System& system, double t, double dt, Eigen::Matrix3Xd& now, Eigen::Matrix3Xd& then);

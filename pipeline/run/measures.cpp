@@ -209,6 +209,17 @@ std::vector<Eigen::Vector3d> pin_reactions(const Build& build, const System& sys
 std::vector<SeamMeasures> seam_forces(const Build& build, const System& system, const DynamicState& state, double dt) {
   std::vector<SeamMeasures> out(build.seams.size());
   if (out.empty() || !(dt > 0)) return out;
+  if (system.springs) {
+    std::size_t spring = 0;
+    for (std::size_t s = 0; s < build.seams.size(); ++s)
+      for (std::size_t k = 0; k < build.seams[s].rows.size(); ++k, ++spring) {
+        const double force = system.springs->force(state.q, spring);
+        out[s].force = std::max(out[s].force, force);
+        out[s].mean_force +=
+            force * build.seams[s].weight[k] / (0.5 * (build.seams[s].length_a + build.seams[s].length_b));
+      }
+    return out;
+  }
   const Reactions r = reactions(system.dynamic, state, dt);
   for (std::size_t k = 0; k < system.place_seam.size(); ++k) {
     const auto [seam, row] = system.place_seam[k];

@@ -66,8 +66,8 @@ class Run::Impl {
     if (!begun_) start();
     if (result_.exit == RunExit::ok && !result_.last_projection.converged) report_limit();
     if (result_.exit == RunExit::ok && scene_.rest && !at_rest()) report_unrest();
-    if (result_.exit == RunExit::ok) check_energy();
     if (result_.exit == RunExit::ok) check_seams();
+    if (result_.exit == RunExit::ok) check_energy();
     result_.time = result_.state.t;
     result_.energy.gravity = gravity_potential(build_, control_points(*result_.system, result_.state));
     result_.wall_seconds = since(start_);
@@ -110,7 +110,7 @@ class Run::Impl {
     result_.last_projection.converged = true;
     const Eigen::VectorXd q = control_points(*result_.system, result_.state);
     Eigen::VectorXd force(q.size());
-    const Elastic elastic = internal_force(build_.model->potentials(), q, force, hooks_.workers);
+    const Elastic elastic = internal_force(result_.system->dynamic.potentials, q, force, hooks_.workers);
     result_.energy.stored = elastic.energy;
     result_.energy.stored.set("limit", limit_energy());
     result_.energy.start = result_.energy.elastic();
@@ -120,7 +120,7 @@ class Run::Impl {
     if (scene_.dt && !implicit()) hold_to_bound();
     result_.watch.rounding = rounding_energy(result_.system->dynamic, build_.start, result_.bound.dt);
     result_.sewing = *result_.system->sewing;
-    if (!result_.sewing.done) {
+    if (!result_.sewing.done()) {
       // Gaps begin to close ever so slowly, where nothing else is at work.
       const double speed = closing_start * scene_.sewing.speed;
       result_.watch.rounding =
@@ -200,7 +200,7 @@ class Run::Impl {
 
   TimeStepBound bound_of(const System& system) const {
     return time_step_bound(*build_.model, *system.map, system.dynamic.node_mass, control_points(system, result_.state),
-                           system.dynamic.workers);
+                           system.dynamic.workers, system.springs.get());
   }
   double limit_energy() const {
     const System& system = *result_.system;
@@ -232,7 +232,7 @@ class Run::Impl {
       if (trouble.empty()) trouble = why_refused(result_.watch, result_.energy, report, result_.dt_last, careful());
       if (trouble.empty()) {
         accept(report);
-        if (!result_.sewing.done) sew(report);
+        if (!result_.sewing.done()) sew(report);
         if (scene_.rest) relax_after(report);
         // The last step of a stretch ends on the target itself, not on a rounded sum.
         if (count == 1 && !halved) result_.state.t = target;
@@ -242,9 +242,9 @@ class Run::Impl {
       if (!halved) result_.accepted = RunState(result_);
       if (!bounded() && !implicit()) hold_to_bound();
       ++result_.redone_steps;
-      if (no_balance && !result_.sewing.done) {
+      if (no_balance && !result_.sewing.done()) {
         hold_back(result_.sewing, scene_);
-        *result_.system->sewing = result_.sewing;
+        set_sewing(*result_.system, build_, result_.sewing, result_.state.q);
       }
       result_.control.refuse(!halved, no_balance);
       result_.watch.trough = result_.watch.balance;
@@ -311,15 +311,25 @@ class Run::Impl {
                        p.strain_violation, p.place_violation);
   }
 
-  // Once the seams are closed, or can't be, the stage is over: gravity and friction come.
+  // Once the seams are closed, or can't be, gravity and friction come.
   void sew(const StepReport& report) {
+    System& system = *result_.system;
     const DynamicState& state = result_.state;
     std::vector<double> force;
-    for (const SeamMeasures& seam : seam_forces(build_, *result_.system, state, report.dt)) force.push_back(seam.force);
-    go_on(result_.sewing, scene_, build_.seams, force, state.t, report.dt);
-    *result_.system->sewing = result_.sewing;
-    if (!result_.sewing.done) return;
-    result_.sewn = state.t;
+    for (const SeamMeasures& seam : seam_forces(build_, system, state, report.dt)) force.push_back(seam.force);
+    const bool over = go_on(result_.sewing, scene_, build_.seams, force, state.t, report.dt);
+    const double tightened = set_sewing(system, build_, result_.sewing, state.q);
+    if (system.springs) {
+      // The springs' ends are moved from outside, as pins are.
+      result_.energy.stored.set(SeamSprings::name, system.springs->energy(state.q));
+      result_.energy.motion_work += tightened;
+      initialise(system.dynamic, result_.state);
+    }
+    if (!over) return;
+    if (system.springs)
+      begin_rows(result_.sewing, scene_, build_.seams, state.q, state.t);
+    else
+      result_.sewn = state.t;
     assemble_anew();
   }
 
@@ -339,7 +349,7 @@ class Run::Impl {
       result_.watch.balance -= report.at_end ? report.kinetic_end : report.kinetic;
       result_.watch.trough = result_.watch.balance;
     }
-    if (result_.state.t < motion_done_ || !result_.sewing.done) restart(relaxation);
+    if (result_.state.t < motion_done_ || !result_.sewing.done()) restart(relaxation);
   }
   std::string unrest() const {
     if (result_.system->path && result_.path.factor != 1)
@@ -362,13 +372,14 @@ class Run::Impl {
       if (progress >= 1) continue;
       const SceneSeam& seam = scene_.seams[k];
       result_.exit = RunExit::check_failed;
-      result_.reason = fmt::format(
-          "{}: seam {}, of panel '{}' to panel '{}', is still open by {:.3g} mm{}", seam.where, k, seam.a.panel,
-          seam.b.panel, 1e3 * open_part(progress) * build_.seams[k].gap,
-          result_.sewing.done ? fmt::format(" where it carries its {:.3g} N/m (sewing.force): the garment is too small "
-                                            "there for what it goes around, or is held apart",
-                                            scene_.sewing.force)
-                              : "; a later solver.until gives it the time to close");
+      result_.reason =
+          fmt::format("{}: seam {}, of panel '{}' to panel '{}', is still open by {:.3g} mm{}", seam.where, k,
+                      seam.a.panel, seam.b.panel, 1e3 * open_part(progress) * build_.seams[k].gap,
+                      result_.sewing.done()
+                          ? fmt::format(" where it carries its {:.3g} N/m (sewing.force): the garment is too small "
+                                        "there for what it goes around, or is held apart",
+                                        scene_.sewing.force)
+                          : "; a later solver.until gives it the time to close");
       return;
     }
   }
@@ -437,6 +448,10 @@ class Run::Impl {
       kinetic += 0.5 * dynamic.node_mass[k] * result_.state.v.segment<3>(3 * k).squaredNorm();
     }
     result_.energy.start += kinetic - result_.energy.kinetic + limit_energy() - result_.energy.stored.of("limit");
+    if (!result_.system->springs && result_.energy.stored.of(SeamSprings::name) != 0) {
+      result_.energy.start -= result_.energy.stored.of(SeamSprings::name);
+      result_.energy.stored.set(SeamSprings::name, 0);
+    }
     result_.energy.kinetic = kinetic;
     result_.energy.stored.set("limit", limit_energy());
     result_.last_projection.converged = true;

@@ -247,6 +247,67 @@ std::string place_at(const TriangleMesh& mesh, const std::filesystem::path& body
   return fmt::format("# Moved by {} m to the body: {}\n", vector(shift), why);
 }
 
+// Places along edges that follow each other, even in length, from start to end.
+std::vector<Vector3d> along_edges(const Pattern& pattern, const std::vector<PatternEdge>& edges, int count) {
+  constexpr int pieces = 24;
+  std::vector<std::pair<double, Vector3d>> line;  // length up to it
+  double length = 0;
+  for (const PatternEdge& edge : edges) {
+    const TrimmedSurface& face = pattern.file.panels[static_cast<std::size_t>(edge.panel)];
+    const Isometry place = placed(pattern.places[static_cast<std::size_t>(edge.panel)]);
+    const Curve2& curve = curve_of(pattern, edge).curve;
+    for (int k = 0; k <= pieces; ++k) {
+      const Eigen::Vector2d p = curve(curve.domain().min + curve.domain().length() * k / pieces);
+      const Vector3d x = place * Vector3d(face.metres_per_unit * face.surface(p.x(), p.y()));
+      if (k > 0) length += (x - line.back().second).norm();
+      line.emplace_back(length, x);
+    }
+  }
+  std::vector<Vector3d> out;
+  std::size_t at = 0;
+  for (int k = 0; k < count; ++k) {
+    const double wanted = length * k / (count - 1);
+    while (at + 2 < line.size() && line[at + 1].first < wanted) ++at;
+    const double whole = line[at + 1].first - line[at].first;
+    const double share = whole > 0 ? std::clamp((wanted - line[at].first) / whole, 0.0, 1.0) : 0;
+    out.push_back((1 - share) * line[at].second + share * line[at + 1].second);
+  }
+  return out;
+}
+
+// Patterns of tops are often drawn for another body: where seams would close through this one's shoulders the panels
+// are raised until the fewest do. A comment that says how far; empty where nothing is to be done.
+std::string clear_seams(const TriangleMesh& mesh, Pattern& pattern) {
+  constexpr int along = 9, across = 19;
+  constexpr double step = 0.01, highest = 0.5;  // m
+  std::vector<Vector3d> ways;                   // places on the straight ways that seams close
+  for (const Stitch& stitch : pattern.stitches) {
+    const std::vector<Vector3d> a = along_edges(pattern, stitch.a, along);
+    std::vector<Vector3d> b = along_edges(pattern, stitch.b, along);
+    if (stitch.reverse) std::ranges::reverse(b);
+    for (std::size_t k = 0; k < a.size(); ++k)
+      for (int i = 1; i <= across; ++i) {
+        const double share = static_cast<double>(i) / (across + 1);
+        ways.push_back((1 - share) * a[k] + share * b[k]);
+      }
+  }
+  const auto inside = [&](double shift) {
+    std::vector<Vector3d> moved = ways;
+    for (Vector3d& x : moved) x.y() += shift;
+    return count_inside(mesh, moved);
+  };
+  std::vector<int> counts;
+  for (int k = 0; k * step <= highest; ++k) counts.push_back(inside(k * step));
+  // Of the first range where so few do the middle.
+  const auto fewest = std::ranges::min_element(counts);
+  const auto end = std::find_if(fewest, counts.end(), [&](int count) { return count != *fewest; });
+  if (fewest == counts.begin()) return {};
+  const double best =
+      step * (static_cast<double>(fewest - counts.begin()) + 0.5 * static_cast<double>(end - fewest - 1));
+  for (PatternPlace& place : pattern.places) place.translate.y() += best;
+  return fmt::format("# Raised by {:.2f} m, where the fewest seams close through the body.\n", best);
+}
+
 // A line of places along a border of the glued garment.
 std::vector<Vector3d> places_along(const Pattern& pattern, const std::vector<GluePart>& line) {
   constexpr int pieces = 16;
@@ -409,6 +470,7 @@ PatternScene pattern_scene(const std::filesystem::path& path, const std::optiona
   if (body) {
     mesh = read_mesh(*body);
     text += place_at(*mesh, *body, drawing, pattern, out);
+    if (!drawing) text += clear_seams(*mesh, pattern);
   }
   PanelChoice written = choice;
   if (written.size.empty() && pattern.file.sizes.size() > 1) written.size = pattern.file.size;

@@ -107,9 +107,10 @@ TEST(Seams, AGapClosesWithoutGravityAndThenHangs) {
   do {
     steps.step();
     lowest = std::min(lowest, at(b, steps.now(), 1, 400, 200).z());
-  } while (!steps.finished() && !steps.now().sewing.done);
+  } while (!steps.finished() && !steps.now().sewing.done());
   const double closed_at = 1.875 * gap / 0.5;
-  EXPECT_NEAR(steps.now().sewn, closed_at, 0.01);
+  EXPECT_GT(steps.now().sewn, closed_at);
+  EXPECT_LT(steps.now().sewn, closed_at + 0.2);
   EXPECT_GT(lowest, -0.03) << "gravity waits";
   const auto closed = measure(b, *steps.now().system, steps.now().state, steps.now().dt_last);
   EXPECT_LT(closed.seams[0].gap, 1e-6);
@@ -184,14 +185,14 @@ TEST(Seams, AGatherPairsByLength) {
 TEST(Seams, ARunWithSeamsIsResumedToTheBit) {
   const Folder folder("resume");
   const std::string text = panel("left", "") + panel("right", "translate = [0.45, 0, 0.02]") + soft +
-                           "[[pin]]\npanel = \"left\"\nat = \"edge:u0\"\n" + right_to_left + limit + until(0.3);
+                           "[[pin]]\npanel = \"left\"\nat = \"edge:u0\"\n" + right_to_left + limit + until(0.6);
   const Build b = two_sheets(folder, text);
   // Before the gap is closed.
   std::string middle;
   RunHooks hooks;
   const SceneMark mark = scene_mark(b);
   hooks.resumable = [&](const RunResult& now) {
-    if (middle.empty() && !now.sewing.done && now.sewing.progress[0] > 0.5)
+    if (middle.empty() && !now.sewing.done() && now.sewing.progress[0] > 0.5)
       middle = format_checkpoint(mark, now, *now.system);
   };
   const RunResult whole = run(b, hooks);
