@@ -121,10 +121,11 @@ void ContactProjection::Impl::find(const ContactForces& kept) {
   rows = search.find(places, workers);
   pushed.setZero();
   for (ContactRow& row : rows) {
-    const double gap = row.distance - row.offset;
-    if (gap < -deep * row.offset) row.bias = std::min(0.0, gap + options.push_out * places.dt);
     row.compliance = row.offset * row.weight / (stiffness * options.acceleration * places.dt * places.dt);
     take_up(row, kept);
+    // As far as it would be without the force that it yields to: under a lasting one it would sink in, step by step.
+    const double gap = row.distance - row.offset + yielding(row) * row.push;
+    if (gap < -deep * row.offset) row.bias = std::min(0.0, gap + options.push_out * places.dt);
     push(row, row.push * row.normal + row.drag, pushed);
   }
   counts.search_seconds += since(start);

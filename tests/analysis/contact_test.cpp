@@ -210,6 +210,21 @@ TEST(Contact, CollidingClothKeepsItsMomenta) {
   EXPECT_LT(fine.tail<3>().norm(), 0.5 * coarse.tail<3>().norm());
 }
 
+// A force far beyond its weight presses cloth into its offset, never through the surface, however long it lasts.
+TEST(Contact, ALastingForceDoesntSinkIn) {
+  for (const double times : {10.0, 300.0}) {
+    ContactSceneOptions o = incline(0, Limit::law);
+    o.gravity *= times;
+    o.contact.acceleration = 9.81;
+    ContactScene scene(o, one(BoxShape{{0.2, 0.2, -0.5}, {2, 2, 1}}, 0.3));
+    scene.run(5e-5, 0.02);
+    const double before = scene.mean().z();
+    EXPECT_GT(before, 0.3 * o.half_thickness) << times;
+    scene.run(5e-5, 0.06);
+    EXPECT_NEAR(scene.mean().z(), before, 0.05 * o.half_thickness) << times;
+  }
+}
+
 // A resume and threads give the same bits.
 TEST(Contact, AResumeAndThreadsChangeNothing) {
   ContactSceneOptions o;
