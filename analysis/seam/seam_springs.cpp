@@ -11,25 +11,24 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-SeamSprings::SeamSprings(std::vector<SeamSpring> springs, double stiffness, double force)
-    : springs_(std::move(springs)), stiffness_(stiffness), most_(force) {}
+SeamSprings::SeamSprings(std::vector<SeamSpring> springs, double force) : springs_(std::move(springs)), most_(force) {}
 
-SeamSprings::Pull SeamSprings::pull(double stretch) const {
+SeamSprings::Pull SeamSprings::pull(const SeamSpring& spring, double length) const {
+  const double stretch = length - spring.slack, end = most_ / spring.stiffness;
   if (!(stretch > 0)) return {};
-  const double end = most_ / stiffness_;
   if (stretch > end) return {most_ * (stretch - 0.5 * end), most_, 0};
-  return {0.5 * stiffness_ * stretch * stretch, stiffness_ * stretch, stiffness_};
+  return {0.5 * spring.stiffness * stretch * stretch, spring.stiffness * stretch, spring.stiffness};
 }
 
 double SeamSprings::energy(const Eigen::Ref<const VectorXd>& q) const {
   double sum = 0;
-  for (const SeamSpring& s : springs_) sum += s.weight * pull(apply(s.row, q).norm() - s.slack).energy;
+  for (const SeamSpring& s : springs_) sum += s.weight * pull(s, apply(s.row, q).norm()).energy;
   return sum;
 }
 
 double SeamSprings::force(const Eigen::Ref<const VectorXd>& q, std::size_t spring) const {
   const SeamSpring& s = springs_[spring];
-  return pull(apply(s.row, q).norm() - s.slack).force;
+  return pull(s, apply(s.row, q).norm()).force;
 }
 
 void SeamSprings::add_force(const Eigen::Ref<const VectorXd>& q, Eigen::Ref<VectorXd> force, Elastic& elastic,
@@ -38,7 +37,7 @@ void SeamSprings::add_force(const Eigen::Ref<const VectorXd>& q, Eigen::Ref<Vect
   for (const SeamSpring& s : springs_) {
     const Vector3d r = apply(s.row, q);
     const double length = r.norm();
-    const Pull p = pull(length - s.slack);
+    const Pull p = pull(s, length);
     if (p.force == 0) continue;
     sum += s.weight * p.energy;
     const Vector3d along = s.weight * p.force / length * r;
@@ -49,7 +48,7 @@ void SeamSprings::add_force(const Eigen::Ref<const VectorXd>& q, Eigen::Ref<Vect
 
 Matrix3d SeamSprings::hessian(const SeamSpring& spring, const Vector3d& r) const {
   const double length = r.norm();
-  const Pull p = pull(length - spring.slack);
+  const Pull p = pull(spring, length);
   if (p.force == 0) return Matrix3d::Zero();
   const Vector3d n = r / length;
   const Matrix3d along = n * n.transpose();

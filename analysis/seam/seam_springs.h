@@ -11,17 +11,18 @@
 namespace toile {
 
 struct SeamSpring {
-  ScalarRow row;      // one place less the other
-  double weight = 0;  // m of seam that it stands for
-  double slack = 0;   // m, up to which the places are free of each other
+  ScalarRow row;         // one place less the other
+  double weight = 0;     // m of seam that it stands for
+  double stiffness = 0;  // N/m2: per length of seam
+  double slack = 0;      // m, up to which the places are free of each other
 };
 
 // Each stores weight h(|r| - slack), r what its row gives: h(s) = k s^2 / 2 up to the largest force, then linear, and 0
 // below 0. They pull along the line between the places, which may turn on its way around a body.
 class SeamSprings final : public Potential {
  public:
-  // `stiffness` [N/m2] and `force` [N/m] per length of seam.
-  SeamSprings(std::vector<SeamSpring> springs, double stiffness, double force);
+  // `force` [N/m] per length of seam, of each at most.
+  SeamSprings(std::vector<SeamSpring> springs, double force);
 
   void set_slack(std::size_t spring, double slack) { springs_[spring].slack = slack; }
   const std::vector<SeamSpring>& springs() const { return springs_; }
@@ -42,12 +43,12 @@ class SeamSprings final : public Potential {
   struct Pull {
     double energy = 0, force = 0, slope = 0;  // of h: J/m, N/m, N/m2
   };
-  Pull pull(double stretch) const;
+  Pull pull(const SeamSpring& spring, double length) const;
   // d2/dr2 of weight h, 0 where it is free.
   Eigen::Matrix3d hessian(const SeamSpring& spring, const Eigen::Vector3d& r) const;
 
   std::vector<SeamSpring> springs_;
-  double stiffness_, most_;
+  double most_;
 };
 
 }  // namespace toile

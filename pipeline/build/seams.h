@@ -68,6 +68,7 @@ bool go_on(Sewing& sewing, const Scene& scene, const std::vector<BuiltSeam>& sea
 void hold_back(Sewing& sewing, const Scene& scene);
 
 constexpr double spring_stiffness = 1000;  // N/m2: 10 N/m, as of a tight waist, leave 10 mm to the rows
+constexpr double spring_period = 2e-3;     // s / (2 pi), of what a spring pulls, at least
 
 // What is left of a gap, 1 to 0, with a speed and an acceleration that rise and fall smoothly.
 double open_part(double progress);

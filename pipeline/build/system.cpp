@@ -338,10 +338,22 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
     system->place_seam.push_back({-1, -1});
   }
   if (pulled) {
+    // Of a row: the inverse of the mass that moves with it [1/kg].
+    const auto inertia = [&](const ScalarRow& row) {
+      Eigen::VectorXd by_node = Eigen::VectorXd::Zero(dynamic.node_mass.size());
+      for (std::size_t k = 0; k < row.index.size(); ++k)
+        for (AffineMap::Matrix::InnerIterator it(system->map->free_part(), row.index[k]); it; ++it)
+          by_node[it.col()] += row.value[k] * it.value();
+      return std::max(by_node.cwiseAbs2().cwiseQuotient(dynamic.node_mass).sum(), 1e-300);
+    };
     std::vector<SeamSpring> springs;
     for (const BuiltSeam& seam : build.seams)
-      for (std::size_t k = 0; k < seam.rows.size(); ++k) springs.push_back({seam.rows[k].row, seam.weight[k], 0});
-    system->springs = std::make_unique<SeamSprings>(std::move(springs), spring_stiffness, scene.sewing.force);
+      for (std::size_t k = 0; k < seam.rows.size(); ++k) {
+        // Light nodes at trims would ask for smaller steps than the cloth does.
+        const double stiffest = 1 / (spring_period * spring_period * inertia(seam.rows[k].row)) / seam.weight[k];
+        springs.push_back({seam.rows[k].row, seam.weight[k], std::min(spring_stiffness, stiffest), 0});
+      }
+    system->springs = std::make_unique<SeamSprings>(std::move(springs), scene.sewing.force);
     set_sewing(*system, build, *system->sewing, build.start);
     dynamic.potentials.push_back(system->springs.get());
   }

@@ -331,6 +331,12 @@ class Run::Impl {
     else
       result_.sewn = state.t;
     assemble_anew();
+    // Steps that were too large for one stage say nothing of the next.
+    result_.control.scale = 1;
+    result_.control.patience = StepControl().patience;
+    // Edges that are pulled together are no motion to be accurate in: the account begins with the sewn cloth.
+    result_.energy.start += result_.watch.balance;
+    result_.energy.injected = result_.watch.balance = result_.watch.trough = 0;
   }
 
   // Pins that would go far within a step would tear at the cloth beside them before the rest of it moves.
@@ -410,7 +416,8 @@ class Run::Impl {
 
   // Steps that the bound chooses are refused for less, if a smaller one would be better.
   bool careful() const {
-    return bounded() && !hard_limit() && result_.control.scale > smallest_careful && result_.steps >= first_steps;
+    return bounded() && !hard_limit() && result_.control.scale > smallest_careful && result_.steps >= first_steps &&
+           result_.sewing.done();
   }
 
   void accept(const StepReport& report) {

@@ -15,10 +15,10 @@ using Eigen::VectorXd;
 
 // Free, within the quadratic part, beyond it.
 SeamSprings springs() {
-  return SeamSprings({{{{0, 1, 2}, {0.4, 0.6, -1.0}}, 0.02, 5.0},
-                      {{{1, 3, 4, 5}, {1.0, -0.2, -0.5, -0.3}}, 0.03, 0.1},
-                      {{{0, 5}, {1.0, -1.0}}, 0.01, 0.2}},
-                     10, 5);
+  return SeamSprings({{{{0, 1, 2}, {0.4, 0.6, -1.0}}, 0.02, 10, 5.0},
+                      {{{1, 3, 4, 5}, {1.0, -0.2, -0.5, -0.3}}, 0.03, 12, 0.1},
+                      {{{0, 5}, {1.0, -1.0}}, 0.01, 10, 0.2}},
+                     5);
 }
 VectorXd places() {
   VectorXd q(18);
