@@ -11,6 +11,7 @@ Action inspect_command(Command& command);
 Action convert_command(Command& command);
 Action roundtrip_command(Command& command);
 Action check_command(Command& command);
+Action measure_command(Command& command);
 Action study_command(Command& command);
 Action init_command(Command& command);
 Action presets_command(Command& command);

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
+#include <random>
 
 #include "geometry/error.h"
 #include "geometry/refine.h"
@@ -52,16 +53,26 @@ Curve2 cubic(Vector2d a, Vector2d b, Vector2d c, Vector2d d) {
   return Curve2(uniform_knots(3, 1), points);
 }
 
+// Faces of one file, by their names.
+void write(const std::filesystem::path& file, std::vector<TrimmedSurface> faces, double metres_per_unit,
+           const std::string& unit) {
+  IgesHeader header;
+  header.product = faces.front().name;
+  header.unit = unit;
+  header.date = "20261122.000000";
+  std::vector<OutputFace> output;
+  for (TrimmedSurface& face : faces) {
+    face.metres_per_unit = metres_per_unit;
+    const std::string name = face.name;
+    output.push_back({std::move(face), name, 0, std::nullopt});
+  }
+  write_file(file, format_iges(output, header).text);
+}
+
 void write(const std::filesystem::path& file, TrimmedSurface face, const std::string& name, double metres_per_unit,
            const std::string& unit) {
   face.name = name;
-  face.metres_per_unit = metres_per_unit;
-  IgesHeader header;
-  header.product = name;
-  header.unit = unit;
-  header.date = "20261122.000000";
-  const OutputFace output{std::move(face), name, 0, std::nullopt};
-  write_file(file, format_iges(std::span(&output, 1), header).text);
+  write(file, {std::move(face)}, metres_per_unit, unit);
 }
 
 TrimmedSurface trimmed(NurbsSurface surface, TrimLoop loop) {
@@ -155,6 +166,34 @@ TrimmedSurface fitted_disc() {
   }
   const KnotVector knots = uniform_knots(2, 1, {-1, 1});
   return untrimmed(NurbsSurface(knots, knots, points, weights));
+}
+
+// A round disc about (0, 0), four quarters of its circle, in a square net of 24 x 24 spans; and where a run may begin:
+// heights outside `calm` raised or lowered by chance, up to `height` each.
+TrimmedSurface round_disc(double radius) {
+  std::vector<Curve2> arcs;
+  const Vector2d turn[] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+  for (int k = 0; k < 4; ++k) {
+    const Vector2d from = radius * turn[k], to = radius * turn[(k + 1) % 4];
+    Eigen::Matrix2Xd points(2, 3);
+    points << from, from + to, to;
+    arcs.emplace_back(uniform_knots(2, 1), points, std::vector<double>{1, std::sqrt(0.5), 1});
+  }
+  const Interval side{-1.06 * radius, 1.06 * radius};
+  return trimmed(flat(side, side, 2, 24, 24), outer_loop(std::move(arcs)));
+}
+
+TrimmedSurface shaken(const TrimmedSurface& disc, double calm, double height, unsigned seed) {
+  std::mt19937 chance(seed);
+  TrimmedSurface start = disc;
+  Eigen::Matrix3Xd points = disc.surface.points();
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    const double share = 2 * static_cast<double>(chance()) / std::mt19937::max() - 1;
+    if (points.col(k).norm() > calm) points(2, k) += share * height;
+  }
+  start.surface = disc.surface.with_points(points);
+  start.name = "start " + std::to_string(seed);
+  return start;
 }
 
 // The unit square with 8 x 8 elements of which the material fills the first four and `fraction` of the fifth, in u only
@@ -291,6 +330,10 @@ int main(int argc, char** argv) {
     write(out / "grid_independence/parallelogram.igs",
           square_in(14, 1.75, {1, 0}, {std::sin(std::numbers::pi / 12), std::cos(std::numbers::pi / 12)}), "cloth", 1,
           "M");
+    TrimmedSurface disc = round_disc(150);
+    disc.name = "disc";
+    write(out / "cusick/disc.igs",
+          {disc, shaken(disc, 110, 1, 1), shaken(disc, 110, 1, 2), shaken(disc, 110, 1, 3)}, mm, "MM");
     write_study_panels(out);
   } catch (const Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
