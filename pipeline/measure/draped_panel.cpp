@@ -24,8 +24,8 @@ DrapedPanel draped_panel(const PanelFile& file) {
     }
   }
   if (!flat || !draped)
-    throw InputError(fmt::format("{}: no pair of panels '... flat' and '... draped', as `toile drape` writes them",
-                                 file.path));
+    throw InputError(
+        fmt::format("{}: no pair of panels '... flat' and '... draped', as `toile drape` writes them", file.path));
   TrimmedSurface face = *draped, rest = *flat;
   validate_loops(face);
   validate_loops(rest);

@@ -154,8 +154,7 @@ std::string drape_svg(const Shadow& shadow, const DrapeMeasure& measure) {
   };
   std::vector<Vector2d> outline;
   for (std::size_t k = 0; k < shadow.radius.size(); ++k)
-    outline.push_back(
-        at(shadow.radius[k], turn * static_cast<double>(k) / static_cast<double>(shadow.radius.size())));
+    outline.push_back(at(shadow.radius[k], turn * static_cast<double>(k) / static_cast<double>(shadow.radius.size())));
   Svg svg;
   svg.circle({half, half}, mm * flat, "flat");
   svg.path(svg_path(outline, true), "shadow");

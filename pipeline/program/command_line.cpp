@@ -23,11 +23,11 @@ struct Entry {
 };
 
 constexpr Entry commands[] = {
-    {"drape", drape_command},     {"inspect", inspect_command},
-    {"convert", convert_command}, {"roundtrip", roundtrip_command},
-    {"check", check_command},     {"measure", measure_command},
-    {"study", study_command},     {"init", init_command},
-    {"presets", presets_command}, {"schema", schema_command},
+    {"drape", drape_command},           {"inspect", inspect_command},
+    {"convert", convert_command},       {"roundtrip", roundtrip_command},
+    {"check", check_command},           {"measure", measure_command},
+    {"study", study_command},           {"init", init_command},
+    {"presets", presets_command},       {"schema", schema_command},
     {"completion", completion_command}, {"help", help_command},
 };
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -15,6 +13,7 @@
 #include "pipeline/measure/draped_panel.h"
 #include "pipeline/program/commands.h"
 #include "pipeline/program/panel_argument.h"
+#include "pipeline/program/refinement.h"
 
 namespace toile {
 namespace {
@@ -22,14 +21,6 @@ namespace {
 struct Arguments {
   std::string what, input, support, svg;
 };
-
-double metres(const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value > 0 && value < 1e6))
-    throw UsageError(fmt::format("--support {}: a radius in metres, above 0", text));
-  return value;
-}
 
 void print_json(const std::string& file, const DrapeMeasure& m, const Shadow& shadow) {
   nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
@@ -47,7 +38,7 @@ void print_json(const std::string& file, const DrapeMeasure& m, const Shadow& sh
 
 int run(const Arguments& a, const Common& common, Console& console) {
   if (a.support.empty()) throw UsageError("toile measure drape needs --support RADIUS");
-  const double support = metres(a.support);
+  const double support = length_option(a.support, "--support");
   require_free(a.svg, common.overwrite);
   const std::filesystem::path input(a.input);
   const std::string file = std::filesystem::is_directory(input) ? (input / "draped.igs").string() : a.input;
@@ -79,12 +70,13 @@ Action measure_command(Command& command) {
   command.about("Read numbers off draped cloth: Cusick's drape coefficient and nodes")
       .choice("WHAT", a->what, {"drape"}, "drape: shadow, drape coefficient, nodes", true)
       .operand("DIR", a->input, "A run's folder, or its draped.igs")
-      .text("--support RADIUS", a->support, "Radius of the support in metres, centred below the cloth's middle")
+      .text("--support RADIUS", a->support,
+            "Radius of the support below the cloth's middle, m or with a unit (\"90 mm\")")
       .text("--svg OUT", a->svg, "Draw the shadow's outline, 1:1")
       .json("Everything as JSON on stdout, the outline's radius ray by ray too")
       .overwrite("Replace the drawing")
-      .example("measure drape out/cusick --support 0.09", "drape coefficient and nodes of a disc over 18 cm")
-      .example("measure drape out/cusick --support 0.09 --svg outline.svg", "its outline as a drawing")
+      .example("measure drape out/cusick --support '90 mm'", "drape coefficient and nodes of a disc over 18 cm")
+      .example("measure drape out/cusick --support '90 mm' --svg outline.svg", "its outline as a drawing")
       .exits({exit_input, exit_geometry, exit_output});
   return [a](const Common& common, Console& console) { return run(*a, common, console); };
 }

@@ -332,8 +332,8 @@ int main(int argc, char** argv) {
           "M");
     TrimmedSurface disc = round_disc(150);
     disc.name = "disc";
-    write(out / "cusick/disc.igs",
-          {disc, shaken(disc, 110, 1, 1), shaken(disc, 110, 1, 2), shaken(disc, 110, 1, 3)}, mm, "MM");
+    write(out / "cusick/disc.igs", {disc, shaken(disc, 110, 1, 1), shaken(disc, 110, 1, 2), shaken(disc, 110, 1, 3)},
+          mm, "MM");
     write_study_panels(out);
   } catch (const Error& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -10,7 +10,9 @@
 #include <string>
 
 #include "io/file.h"
+#include "pipeline/draped_cap.h"
 #include "pipeline/panels.h"
+#include "support/near.h"
 
 namespace toile {
 namespace {
@@ -339,6 +341,44 @@ TEST(Program, ConvertAndInspectReplaceNothingUnasked) {
   EXPECT_EQ(run.code, 8);
   EXPECT_EQ(read_file(folder / "coat.mtl"), "mine");
   EXPECT_FALSE(std::filesystem::exists(folder / "coat.obj"));
+}
+
+// (shadow - support) / (cloth - support), of a cap whose shadow is a disc.
+TEST(Program, MeasuresADrape) {
+  const Folder folder("measure");
+  const test::DrapedCap cap;
+  std::filesystem::create_directories(folder / "run");
+  test::write_panels(folder / "run/draped.igs", test::draped_cap(cap).panels);
+  const Outcome run = toile(folder, "measure drape run --support 0.09 --json --svg outline.svg");
+  ASSERT_EQ(run.code, 0) << run.err;
+  const auto json = nlohmann::json::parse(run.out);
+  const double held = 0.09 * 0.09;
+  expect_near_rel(json.at("drape_coefficient").get<double>(),
+                  100 * (cap.rim() * cap.rim() - held) / (cap.radius * cap.radius - held), 2e-3);
+  EXPECT_EQ(json.at("node_count"), 0);
+  EXPECT_EQ(json.at("outline").size(), 3600u);
+  EXPECT_NE(read_file(folder / "outline.svg").find(">0 nodes<"), std::string::npos);
+  const Outcome words = toile(folder, "measure drape run/draped.igs --support '90 mm'");
+  EXPECT_EQ(words.code, 0) << words.err;
+  EXPECT_NE(words.out.find(", 0 nodes; "), std::string::npos) << words.out;
+  test::write_panels(folder / "panel.igs", {test::trimmed_sheet("cloth")});
+  struct Wrong {
+    int code;
+    const char *arguments, *message;
+  };
+  for (const Wrong& wrong : {Wrong{2, "drape run", "--support"},
+                             {2, "drape run --support wide", "--support: "},
+                             {2, "drape run --support '90 kg'", "--support: "},
+                             {2, "drape run --support=-1", "--support must be positive"},
+                             {3, "drape run --support 0.2", "larger than the cloth"},
+                             {3, "drape nowhere --support 0.09", "nowhere"},
+                             {3, "drape panel.igs --support 0.09", "no pair of panels"},
+                             {8, "drape run --support 0.09 --svg outline.svg", "exists; give --overwrite"}}) {
+    const Outcome bad = toile(folder, std::string("measure ") + wrong.arguments);
+    EXPECT_EQ(bad.code, wrong.code) << wrong.arguments << "\n" << bad.err;
+    EXPECT_NE(bad.err.find(wrong.message), std::string::npos) << bad.err;
+    EXPECT_TRUE(bad.out.empty()) << bad.out;
+  }
 }
 
 TEST(Program, AnUnmetLimitIsExit6) {

@@ -4,10 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
 
+#include "geometry/error.h"
+#include "pipeline/draped_cap.h"
+#include "pipeline/measure/draped_panel.h"
 #include "support/near.h"
 
 namespace toile {
@@ -58,9 +63,8 @@ TEST(Shadow, OfACosineHasItsAreaNodesAndAmplitude) {
 // 2 % of the free ring of 60 mm are 1.2 mm from valley to top.
 TEST(Shadow, RipplesBelowTwoPercentOfTheFreeRingAreNoNodes) {
   const auto nodes = [](double ripple) {
-    const Shadow shadow =
-        fan([&](double angle) { return 0.12 + 0.01 * std::cos(5 * angle) + ripple * std::cos(60 * angle); }, {0, 0},
-            3600);
+    const Shadow shadow = fan(
+        [&](double angle) { return 0.12 + 0.01 * std::cos(5 * angle) + ripple * std::cos(60 * angle); }, {0, 0}, 3600);
     return measure_drape(shadow, 0.09, pi * 0.15 * 0.15).nodes.size();
   };
   EXPECT_EQ(nodes(0.3e-3), 5u);
@@ -77,6 +81,34 @@ TEST(Shadow, CoversTwiceWhatIsThereOnceAndLeavesGapsOut) {
   expect_near_rel(shadow.area, 1.5 + pi * 0.25 * 0.25, 1e-3);
   expect_near_rel(shadow.radius[0], 2.5, 1e-12);
   expect_near_rel(shadow.radius[1800], 0.25, 1e-12);
+}
+
+// A part of a sphere, exact: its shadow is the disc within its rim.
+TEST(Shadow, OfASphericalCapIsTheDiscWithinItsRim) {
+  const test::DrapedCap cap;
+  for (const double degrees : {0.0, 35.0, 90.0}) {
+    const Eigen::Matrix3d turned =
+        Eigen::AngleAxisd(degrees * pi / 180, Eigen::Vector3d(1, 2, 0).normalized()).matrix();
+    PanelFile file = test::draped_cap(cap, turned);
+    file.up = turned.col(2);
+    const DrapedPanel panel = draped_panel(file);
+    expect_near_rel(panel.flat_area, pi * cap.radius * cap.radius, 1e-9);
+    EXPECT_LT(panel.centre.norm(), 1e-9);
+    const Shadow shadow = shadow_of(panel.points, panel.triangles, panel.centre, 0.03);
+    const auto [least, largest] = std::ranges::minmax(shadow.radius);
+    expect_near_rel(least, cap.rim(), 1e-3);  // triangles to 0.1 mm
+    expect_near_rel(largest, cap.rim(), 1e-9);
+    expect_near_rel(shadow.area, pi * cap.rim() * cap.rim(), 1e-3);
+    EXPECT_TRUE(measure_drape(shadow, 0.03, panel.flat_area).nodes.empty());
+  }
+}
+
+TEST(Shadow, IsOfOnePairOfPanels) {
+  const PanelFile both = test::draped_cap({});
+  PanelFile one = both, several = both;
+  one.panels.pop_back();
+  several.panels.push_back(both.panels.back());
+  for (const PanelFile& file : {one, several, PanelFile()}) EXPECT_THROW(draped_panel(file), InputError);
 }
 
 TEST(Shadow, DrawsItsOutlineInMillimetres) {
