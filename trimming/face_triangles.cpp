@@ -39,8 +39,9 @@ class Refinement {
     }
   }
 
-  // Halves every edge that is farther off than `chord_error`, and the longest edge of such triangles. Whether there was
-  // one.
+  // Halves every edge that is farther off than `chord_error`, the longest edge of such triangles, and that of every
+  // triangle that is halved [Rivara 1984]: an edge below the chord error beside edges above it would stay, and
+  // triangles along it grow thinner without end. Whether there was one.
   bool refine(double chord_error) {
     const MeshTopology topology(triangles_, static_cast<int>(uv_.size()));
     std::vector<int> middle(topology.edge_count(), -1);
@@ -61,12 +62,23 @@ class Refinement {
     for (int e = 0; e < topology.edge_count(); ++e)
       if (found[e].off > chord_error) split(e);
     const int count = static_cast<int>(triangles_.size());
+    std::vector<int> longest(count);
     for (int f = 0; f < count; ++f) {
+      longest[f] = longest_edge(topology, f);
       const auto [a, b, c] = triangles_[f];
       const Vector2d uv = (uv_[a] + uv_[b] + uv_[c]) / 3;
       const double off = (face_.surface(uv.x(), uv.y()) - (x_[a] + x_[b] + x_[c]) / 3).norm();
       worst_ = std::max(worst_, off);
-      if (off > chord_error) split(longest_edge(topology, f));
+      if (off > chord_error) split(longest[f]);
+    }
+    for (bool more = true; more;) {
+      more = false;
+      for (int f = 0; f < count; ++f) {
+        if (middle[longest[f]] >= 0) continue;
+        if (std::ranges::none_of(topology.edges_of_face(f), [&](int e) { return middle[e] >= 0; })) continue;
+        split(longest[f]);
+        more = true;
+      }
     }
     std::vector<Triangle> finer;
     for (int f = 0; f < count; ++f) {

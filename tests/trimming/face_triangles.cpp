@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "geometry/error.h"
 #include "geometry/nurbs_curve.h"
@@ -60,6 +62,33 @@ TEST(FaceTriangles, MeetTheChordErrorWithoutWaste) {
     EXPECT_NEAR(area(found.mesh), exact, exact * error);
     const double longest = 2 * std::sqrt(2 * error);
     EXPECT_LT(static_cast<double>(found.mesh.triangles.size()), 40 * exact / (longest * longest));
+  }
+}
+
+// Longest edge over height above it.
+double thinness(const TriangleMesh& mesh, const Triangle& t) {
+  const Vector3d a = mesh.vertices.col(t[0]), b = mesh.vertices.col(t[1]), c = mesh.vertices.col(t[2]);
+  const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+  return longest * longest / (b - a).cross(c - a).norm();
+}
+
+// Edges just below the chord error beside edges just above it: once triangles along the first grew thinner without end.
+TEST(FaceTriangles, AreNotThinAtAnyChordError) {
+  constexpr int spans = 12;
+  const KnotVector knots = uniform_knots(2, spans, {0, 1});
+  Eigen::Matrix3Xd net(3, (spans + 2) * (spans + 2));
+  std::mt19937 chance(7);
+  for (int j = 0; j < spans + 2; ++j)
+    for (int i = 0; i < spans + 2; ++i)
+      net.col(j * (spans + 2) + i) =
+          Vector3d(knots.greville(i), knots.greville(j), 0.06 * static_cast<double>(chance()) / std::mt19937::max());
+  TrimmedSurface face = untrimmed(NurbsSurface(knots, knots, net));
+  validate_loops(face);
+  for (int k = 0; k < 40; ++k) {
+    const double error = 2e-3 * std::pow(0.95, k);
+    const FaceTriangles found = face_triangles(face, error);
+    EXPECT_LE(found.chord_error, error);
+    for (const Triangle& t : found.mesh.triangles) ASSERT_LT(thinness(found.mesh, t), 20) << error;
   }
 }
 
