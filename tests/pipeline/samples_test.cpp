@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <span>
 #include <string>
 #include <utility>
@@ -14,6 +15,8 @@
 #include "io/file.h"
 #include "io/iges.h"
 #include "pipeline/build/build.h"
+#include "pipeline/measure/draped_panel.h"
+#include "pipeline/output/output.h"
 #include "pipeline/panels.h"
 #include "pipeline/run/measures.h"
 #include "pipeline/run/run.h"
@@ -97,7 +100,7 @@ TEST(Samples, PanelsAreWhatTheDrafterWrites) {
       EXPECT_EQ(read_file(entry.path()), read_file(kept));
     ++files;
   }
-  EXPECT_EQ(files, 38);
+  EXPECT_EQ(files, 39);
 }
 
 // Example 4.4 with projection, the limit carrying almost all of the load: eq. 37, raw and smoothed. The paper's variant
@@ -199,6 +202,25 @@ TEST(Samples, TurnedNetsDrapeLikeTheFittedOne) {
     mean.push_back(std::sqrt(squares / (2 * static_cast<double>(spans.size()))));
   }
   EXPECT_LT(mean[1], 0.8 * mean[0]) << mean[0];
+}
+
+// Of a bending length of 2 cm, after a second: nodes by the line that 25 fabrics were measured to lie around, which no
+// count of two or four would meet; the coefficient of plain cotton.
+TEST(Samples, CusickDrapesIntoAsManyNodesAsFabricsDo) {
+  const Build built =
+      build(read_scene(std::string(TOILE_SAMPLES "/cusick/scene.toml"), {"solver.until=1", "output.every=0.5"}));
+  const RunResult result = run(built);
+  ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+  const Eigen::VectorXd q = control_points(*result.system, result.state);
+  const DrapedPanel panel = draped_panel(parse_iges(draped_file(built, q).text, "draped.igs"));
+  constexpr double support = 0.09;
+  const DrapeMeasure drape =
+      measure_drape(shadow_of(panel.points, panel.triangles, panel.centre, support), support, panel.flat_area);
+  expect_near_rel(drape.flat_area, std::numbers::pi * 0.15 * 0.15, 1e-6);
+  EXPECT_LT(panel.centre.norm(), 1e-3);  // it stays where it is held
+  EXPECT_GT(drape.coefficient, 60);
+  EXPECT_LT(drape.coefficient, 76);
+  EXPECT_NEAR(static_cast<double>(drape.nodes.size()), 11.41 - 0.0613 * drape.coefficient, 2);
 }
 
 }  // namespace
