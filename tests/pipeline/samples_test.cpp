@@ -207,8 +207,8 @@ TEST(Samples, TurnedNetsDrapeLikeTheFittedOne) {
 // Of a bending length of 2 cm, after a second: nodes by the line that 25 fabrics were measured to lie around, which no
 // count of two or four would meet; the coefficient of plain cotton.
 TEST(Samples, CusickDrapesIntoAsManyNodesAsFabricsDo) {
-  const Build built =
-      build(read_scene(std::string(TOILE_SAMPLES "/cusick/scene.toml"), {"solver.until=1", "output.every=0.5"}));
+  const std::vector<std::string> settings{"solver={until=1}", "output.every=0.5"};
+  const Build built = build(read_scene(std::string(TOILE_SAMPLES "/cusick/scene.toml"), settings));
   const RunResult result = run(built);
   ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
   const Eigen::VectorXd q = control_points(*result.system, result.state);
