@@ -126,6 +126,7 @@ void ContactProjection::Impl::find(const ContactForces& kept) {
     // As far as it would be without the force that it yields to: under a lasting one it would sink in, step by step.
     const double gap = row.distance - row.offset + yielding(row) * row.push;
     if (gap < -deep * row.offset) row.bias = std::min(0.0, gap + options.push_out * places.dt);
+    row.advance = std::max(0.0, row.bias - gap);
     push(row, row.push * row.normal + row.drag, pushed);
   }
   counts.search_seconds += since(start);
@@ -305,7 +306,8 @@ ProjectionReport ContactProjection::step(Nodes x, Nodes v, double t, const Eigen
   for (const ContactRow& row : s.rows) {
     if (row.push == 0) continue;
     ++report.contacts;
-    report.contact_work += (row.push * row.normal + row.drag).dot(row.obstacle_move) / (dt * dt);
+    report.contact_work +=
+        ((row.push * row.normal + row.drag).dot(row.obstacle_move) + row.push * row.advance) / (dt * dt);
   }
   return report;
 }

@@ -25,6 +25,7 @@ struct ContactRow {
   double chord = 0;       // m, the part of the offset that is chord error
   double distance = 0;    // m, at the start of the step
   double bias = 0;        // m, <= 0: what is left to be pushed out later
+  double advance = 0;     // m, that what starts too near is moved off in the step: the contact's work on it
   double weight = 0;      // sum value^2 / mass [1/kg]
   double compliance = 0;  // m per impulse [1/kg]
   int feature = 0;        // of the obstacle

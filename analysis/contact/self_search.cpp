@@ -16,8 +16,9 @@ using Eigen::Matrix3Xd;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double sewn_offsets = 3;  // from a seam, that its two sides may be nearer than cloth
-constexpr double beyond = 0.05;     // of an edge or triangle: so far outside of it something may pass through it
+// In a chart, below which sewn cloth may touch, and from which it keeps its whole thickness.
+constexpr double free_offsets = 3, whole_offsets = 12;
+constexpr double beyond = 0.05;  // of an edge or triangle: so far outside of it something may pass through it
 
 bool inside(double share, double slack) {
   return share >= -slack && share <= 1 + slack;
@@ -224,9 +225,10 @@ void SelfSearch::edges_to_edges(const Moved& m, int a, int b, std::vector<SelfMe
   }
 }
 
-// Whether its two places are so near each other in a chart.
-bool SelfSearch::sewn(const SelfMeeting& meeting, double within) const {
-  if (charts_.empty()) return false;
+// The least that its two places are from each other in any chart that has both; infinite where none has.
+double SelfSearch::chart_distance(const SelfMeeting& meeting) const {
+  double least = HUGE_VAL;
+  if (charts_.empty()) return least;
   const auto of = [&](int vertex) -> const std::vector<OnChart>& { return charts_[static_cast<std::size_t>(vertex)]; };
   for (const OnChart& on : of(meeting.vertices.front().first)) {
     Vector2d apart = Vector2d::Zero();
@@ -237,9 +239,9 @@ bool SelfSearch::sewn(const SelfMeeting& meeting, double within) const {
       apart += entry.second * there->place;
       return true;
     });
-    if (all && apart.lpNorm<1>() < within) return true;
+    if (all) least = std::min(least, apart.lpNorm<1>());
   }
-  return false;
+  return least;
 }
 
 // With its thickness and chord errors, if that may be touched.
@@ -268,7 +270,15 @@ void SelfSearch::add(const Moved& m, SelfMeeting meeting, std::vector<SelfMeetin
   meeting.distance = meeting.normal.dot(before);
   const double offset = meeting.thickness + meeting.chord;
   const bool one_panel = proxy_.panel(meeting.vertices.front().first) == proxy_.panel(meeting.vertices.back().first);
-  if (gap > offset + m.margin || (one_panel && rest.norm() < offset) || sewn(meeting, sewn_offsets * offset)) return;
+  if (gap > offset + m.margin || (one_panel && rest.norm() < offset)) return;
+  const double sewn = chart_distance(meeting) / offset;
+  if (sewn < free_offsets) return;
+  if (sewn < whole_offsets) {
+    const double part = (sewn - free_offsets) / (whole_offsets - free_offsets);
+    meeting.thickness *= part;
+    meeting.chord *= part;
+    if (gap > part * offset + m.margin) return;
+  }
   out.push_back(std::move(meeting));
 }
 

@@ -33,7 +33,7 @@ struct SewnChart {
 //   (1) found is what comes within offset + margin, and what passes through: where the two are in one plane, with
 //       heights that change in proportion to time [after Provot 1997, whose cubic is exact also where planes turn];
 //   (2) places of one panel that are within an offset of each other at rest don't meet, nor those that are within three
-//       in a chart: sewn cloth folds at its seam;
+//       in a chart; from there to twelve their thickness grows to the whole: sewn cloth lies on itself at its seam;
 //   (3) neighbouring cells whose triangles face within a right angle of each other don't meet [Volino &
 //       Magnenat-Thalmann 1994]: flat cloth costs a box and a cone of normals a cell.
 class SelfSearch {
@@ -63,7 +63,7 @@ class SelfSearch {
   void edges_to_edges(const Moved& moved, int a, int b, std::vector<SelfMeeting>& out) const;
   void add(const Moved& moved, SelfMeeting meeting, std::vector<SelfMeeting>& out) const;
   bool neighbours(int a, int b) const;
-  bool sewn(const SelfMeeting& meeting, double within) const;
+  double chart_distance(const SelfMeeting& meeting) const;
 
   const ContactProxy& proxy_;
   Eigen::Matrix3Xd rest_;

@@ -175,6 +175,11 @@ std::unique_ptr<System> assemble(const Build& build, double t, Workers* workers,
   auto system = std::make_unique<System>();
   *system->sewing = sewing ? *sewing : open_seams(scene, build.seams, build.start);
   const bool pulled = system->sewing->stage == Sewing::springs;
+  if (!system->sewing->done() && scene.rest && scene.rest->method == RestMethod::newton)
+    throw InputError(fmt::format(
+        "{}: seams are open at the start, and solver.rest.method = \"newton\" has no time to close them; use "
+        "\"relaxation\", or start from a drape whose seams are closed",
+        scene.path.string()));
 
   // What each pin holds.
   struct Held {

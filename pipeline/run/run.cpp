@@ -22,7 +22,7 @@ constexpr double rest_share = 1e-4;  // of the largest panel, of the tolerance o
 constexpr double smallest_careful = 1.0 / 16;
 constexpr int first_steps = 10;
 constexpr double implicit_step = 1.0 / 60;  // s, where the scene names none
-constexpr double closing_start = 1e-3;      // of the speed of closing gaps
+constexpr double closing_start = 0.1;       // of the speed of closing gaps: slower than that is little beside it
 constexpr double pins_per_step = 0.1;       // of the longest span
 
 }  // namespace

@@ -56,6 +56,18 @@ TEST(ContactScene, ATableCarriesTheCloth) {
   EXPECT_LT(report["energy"]["injected"], 1e-4 * report["energy"]["loads_work"].get<double>());
 }
 
+// What starts inside is moved off, against the cloth's own forces: that is work, not energy from nowhere.
+TEST(ContactScene, AStartInsideIsPushedOutWithAnAccountOfItsWork) {
+  const Folder folder("inside");
+  const Build b =
+      built(folder, scene_over(ball), {"panel.0.place.translate=[-0.2, -0.2, -0.008]", "load.gravity=[0,0,0]"});
+  const RunResult result = run(b);
+  ASSERT_EQ(result.exit, RunExit::ok) << result.reason;
+  EXPECT_LT(report_of(b, result)["contact"]["max_penetration"], 2e-4);
+  EXPECT_GT(result.energy.motion_work, 0);
+  EXPECT_LT(result.energy.injected, 0.01 * result.energy.motion_work);
+}
+
 TEST(ContactScene, ASceneWithoutObstaclesHasNoContact) {
   const Folder folder("nothing");
   std::string text = scene_over(table);
